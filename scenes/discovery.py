@@ -1,0 +1,28 @@
+"""Finding plug-in modules in a package, so that adding a file is all it takes to add a kind of thing."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from types import ModuleType
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+def modules_in(package: ModuleType) -> list[ModuleType]:
+    """The package's modules, in alphabetical order (sampling order must not depend on the file system)."""
+    names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
+    return [importlib.import_module(f"{package.__name__}.{name}") for name in names]
+
+
+def concrete_subclasses(package: ModuleType, base: type[T]) -> dict[str, type[T]]:
+    """Every instantiable subclass of `base` defined in the package's modules, by class name."""
+    found: dict[str, type[T]] = {}
+    for module in modules_in(package):
+        for name, member in inspect.getmembers(module, inspect.isclass):
+            local = member.__module__ == module.__name__
+            if local and issubclass(member, base) and not inspect.isabstract(member):
+                found[name] = member
+    return found

@@ -1,0 +1,1 @@
+"""One module a family; each defines `FAMILY` and is found by itself."""

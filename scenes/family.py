@@ -1,0 +1,33 @@
+"""What a family of worlds is: a name, a typed config and a sampler."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from scenes.spec import Scene
+
+
+@dataclass(frozen=True)
+class FamilyConfig:
+    """What every family lets the user choose; each family's own config adds its ranges."""
+
+    width: int = 960
+    """Image width, pixels."""
+    height: int = 540
+    """Image height, pixels."""
+    frames: int = 1
+    """Frames per scene."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """One kind of world."""
+
+    name: str
+    config: type[FamilyConfig]
+    sample: Callable[[np.random.Generator, Any], Scene]
+    """Draws one scene from a generator and an instance of `config`."""

@@ -1,0 +1,29 @@
+"""The families of worlds. A new family is one new module in `scenes.families` with a `FAMILY` in it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import scenes.families
+from scenes.discovery import modules_in
+from scenes.family import Family, FamilyConfig
+from scenes.spec import Scene
+
+FAMILIES: dict[str, Family] = {
+    module.FAMILY.name: module.FAMILY for module in modules_in(scenes.families)
+}
+
+
+def sample_scene(rng: np.random.Generator, family: str, config: FamilyConfig | None = None) -> Scene:
+    """Draw a random scene of a family.
+
+    The same generator state, family and config give the same scene on any machine. Raises ValueError for
+    a family that does not exist or a config of another family.
+    """
+    if family not in FAMILIES:
+        raise ValueError(f"there is no scene family {family!r}; there are {', '.join(sorted(FAMILIES))}")
+    kind = FAMILIES[family]
+    config = kind.config() if config is None else config
+    if not isinstance(config, kind.config):
+        raise ValueError(f"{family} takes a {kind.config.__name__}, not a {type(config).__name__}")
+    return kind.sample(rng, config)

@@ -1,0 +1,81 @@
+"""Scenes and configs to plain JSON-able data and back.
+
+Shapes, textures and lights are written with their class name under "kind"; reading accepts only names that
+are registered subclasses, so a scene file can build data but never run code.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import is_dataclass
+from typing import Any, TypeVar
+
+from cattrs import Converter, transform_error
+from cattrs.errors import ClassValidationError
+from cattrs.gen import make_dict_structure_fn
+from cattrs.strategies import configure_tagged_union
+
+import scenes.shapes
+import scenes.textures
+from scenes.spec import Light, Scene, Shape, Texture
+
+T = TypeVar("T")
+
+
+def _tagged(converter: Converter, base: Any, kinds: dict[str, type]) -> None:
+    """Read and write any of `kinds` where the base class is asked for, its name under "kind"."""
+
+    def structure(data: Any, _: Any) -> Any:
+        kind = kinds.get(data.get("kind")) if isinstance(data, dict) else None
+        if kind is None:
+            raise ValueError(f"expected a {base.__name__} with a known 'kind', got {str(data)[:80]!r}")
+        return converter.structure({key: value for key, value in data.items() if key != "kind"}, kind)
+
+    converter.register_structure_hook_func(lambda cls: cls is base, structure)
+    converter.register_unstructure_hook_func(
+        lambda cls: cls is base,
+        lambda item: {"kind": type(item).__name__, **converter.unstructure(item, type(item))},
+    )
+
+
+def _make_converter() -> Converter:
+    converter = Converter(forbid_extra_keys=True)
+    converter.register_structure_hook_factory(
+        is_dataclass,
+        lambda cls: make_dict_structure_fn(cls, converter, _cattrs_forbid_extra_keys=True),
+    )
+    _tagged(converter, Shape, scenes.shapes.SHAPES)
+    _tagged(converter, Texture, scenes.textures.TEXTURES)
+    configure_tagged_union(Light, converter, tag_name="kind")
+    return converter
+
+
+_converter = _make_converter()
+
+
+def to_plain(record: Any) -> Any:
+    """A record as dicts, lists, strings and numbers, ready for JSON or YAML."""
+    return json.loads(json.dumps(_converter.unstructure(record)))
+
+
+def from_plain(data: Any, kind: type[T]) -> T:
+    """The record of type `kind` described by plain data. ValueError says which field is wrong and why."""
+    try:
+        return _converter.structure(data, kind)
+    except ClassValidationError as error:
+        raise ValueError("; ".join(transform_error(error, path=kind.__name__))) from error
+    except (TypeError, KeyError) as error:
+        raise ValueError(f"{kind.__name__}: {error}") from error
+
+
+def scene_to_json(scene: Scene) -> str:
+    return json.dumps(_converter.unstructure(scene), indent=1)
+
+
+def scene_from_json(text: str) -> Scene:
+    """Raises ValueError with one sentence for text that is not a scene."""
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"not JSON: {error}") from error
+    return from_plain(data, Scene)

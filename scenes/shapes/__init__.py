@@ -1,0 +1,9 @@
+"""Shape generators, a module a kind of geometry. A new `Shape` subclass in a module here is found by itself."""
+
+import sys
+
+from scenes.discovery import concrete_subclasses
+from scenes.spec import Shape
+
+SHAPES: dict[str, type[Shape]] = concrete_subclasses(sys.modules[__name__], Shape)
+"""Every shape by class name."""

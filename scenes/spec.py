@@ -1,0 +1,231 @@
+"""The Scene record: everything that is in a world, as plain data.
+
+A `Scene` is what a family samples and what `datagen` renders. It knows nothing of Blender: shapes and
+textures are small records of parameters that build their own numpy arrays, so the same record gives the
+same geometry and the same pixels on any machine. `scenes.serialization` turns it into JSON and back.
+
+Frames of reference
+-------------------
+World: right-handed, z up, metres. Camera: x right, y up, looking along -z (Blender's and OpenGL's
+convention). The rig's pose is the left eye's; the right eye is `baseline_m` along the rig's own x axis.
+Time is in frames; frame k of a scene is the instant t = k, k = 0 .. frames - 1.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
+
+from scenes.mesh import Mesh
+
+Vector = tuple[float, float, float]
+Color = tuple[float, float, float]
+"""Linear RGB, 0..1 for reflectances, unbounded for light."""
+Quaternion = tuple[float, float, float, float]
+"""(w, x, y, z), unit length."""
+
+IDENTITY_ROTATION: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Shape(ABC):
+    """Parameters of one solid; subclasses in `scenes.shapes` each know one way to build a mesh."""
+
+    @classmethod
+    @abstractmethod
+    def sample(cls, rng: np.random.Generator) -> Self:
+        """Draw the parameters of a random instance."""
+
+    @abstractmethod
+    def mesh(self) -> Mesh:
+        """Build the mesh, centred on the origin and filling the cube [-1, 1]^3 in its longest axis."""
+
+
+@dataclass(frozen=True)
+class Texture(ABC):
+    """Parameters of one image texture; subclasses in `scenes.textures` each know one way to paint it."""
+
+    @classmethod
+    @abstractmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        """Draw the parameters of a random texture of `size` x `size` pixels."""
+
+    @abstractmethod
+    def image(self) -> NDArray[np.uint8]:
+        """Paint the texture: (H, W, 3) uint8 sRGB, row 0 at the top."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """How a surface answers light: one base-colour texture and the scalars of a principled BSDF."""
+
+    color: Texture
+    repeats: float = 1.0
+    """How often the texture repeats over one unit of the mesh's texture coordinates."""
+    roughness: float = 1.0
+    """0 a mirror, 1 chalk. At 1 with no metal, glass or light of its own the surface is purely diffuse."""
+    specular: float = 0.0
+    """Strength of the dielectric highlight, 0..1 (0.5 is common plastic)."""
+    metallic: float = 0.0
+    transmission: float = 0.0
+    """Share of light refracted through the surface; ground truth still sees the first surface."""
+    emission: float = 0.0
+    """Radiance the surface gives off, times its colour."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A smooth rigid motion through key poses: cubic spline of positions, rotation spline of attitudes."""
+
+    times_frames: tuple[float, ...]
+    positions_m: tuple[Vector, ...]
+    rotations: tuple[Quaternion, ...]
+
+    def __post_init__(self) -> None:
+        count = len(self.times_frames)
+        if count == 0 or len(self.positions_m) != count or len(self.rotations) != count:
+            raise ValueError(
+                f"a trajectory needs as many positions and rotations as times, and at least one; got "
+                f"{count} times, {len(self.positions_m)} positions, {len(self.rotations)} rotations"
+            )
+        if any(b <= a for a, b in zip(self.times_frames, self.times_frames[1:], strict=False)):
+            raise ValueError("a trajectory's times must increase")
+
+    @classmethod
+    def static(cls, position_m: Vector = (0.0, 0.0, 0.0), rotation: Quaternion = IDENTITY_ROTATION) -> Self:
+        return cls(times_frames=(0.0,), positions_m=(position_m,), rotations=(rotation,))
+
+    @cached_property
+    def _splines(self) -> tuple[CubicSpline, RotationSpline]:
+        rotations = Rotation.from_quat([(x, y, z, w) for w, x, y, z in self.rotations])
+        return CubicSpline(self.times_frames, self.positions_m), RotationSpline(self.times_frames, rotations)
+
+    def pose(self, time_frames: float) -> NDArray[np.float64]:
+        """The (4, 4) local-to-world matrix at an instant; held at the ends outside the key times."""
+        pose = np.eye(4)
+        if len(self.times_frames) == 1:
+            w, x, y, z = self.rotations[0]
+            pose[:3, :3] = Rotation.from_quat((x, y, z, w)).as_matrix()
+            pose[:3, 3] = self.positions_m[0]
+            return pose
+        time = float(np.clip(time_frames, self.times_frames[0], self.times_frames[-1]))
+        positions, rotations = self._splines
+        pose[:3, :3] = rotations(time).as_matrix()
+        pose[:3, 3] = positions(time)
+        return pose
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One thing in the world: a shape, scaled along its own axes, wearing a material, on a path."""
+
+    name: str
+    shape: Shape
+    material: int
+    """Index into `Scene.materials`."""
+    motion: Trajectory
+    scale_m: Vector = (1.0, 1.0, 1.0)
+    """Half extents: the shape's cube [-1, 1]^3 becomes a box of twice this size."""
+
+    def pose(self, time_frames: float) -> NDArray[np.float64]:
+        """The (4, 4) matrix from mesh coordinates to the world, scale included."""
+        return self.motion.pose(time_frames) @ np.diag((*self.scale_m, 1.0))
+
+
+@dataclass(frozen=True)
+class StereoCamera:
+    """A rectified pair of pinhole cameras: square pixels, principal point in the middle, same focal length."""
+
+    width: int
+    height: int
+    focal_mm: float
+    baseline_m: float
+    motion: Trajectory
+    """Path of the left eye."""
+    sensor_width_mm: float = 32.0
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height", "focal_mm", "baseline_m", "sensor_width_mm"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"a camera's {name} must be positive, got {getattr(self, name)}")
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length in pixels, the same along x and y."""
+        return self.focal_mm / self.sensor_width_mm * self.width
+
+    @property
+    def disparity_metres(self) -> float:
+        """fx * B: disparity in pixels times depth in metres."""
+        return self.focal_px * self.baseline_m
+
+    def pose(self, eye: str, time_frames: float) -> NDArray[np.float64]:
+        """The (4, 4) camera-to-world matrix of the "left" or "right" eye."""
+        pose = self.motion.pose(time_frames)
+        if eye == "right":
+            pose[:3, 3] += pose[:3, 0] * self.baseline_m
+        elif eye != "left":
+            raise ValueError(f"an eye is 'left' or 'right', not {eye!r}")
+        return pose
+
+
+@dataclass(frozen=True)
+class SunLight:
+    direction: Vector
+    """Where the light travels to (world)."""
+    color: Color
+    irradiance: float
+    """W/m^2 on a surface facing the sun."""
+    angle_deg: float
+    """Apparent diameter: small gives hard shadows."""
+
+
+@dataclass(frozen=True)
+class AreaLight:
+    position_m: Vector
+    target_m: Vector
+    color: Color
+    power_w: float
+    size_m: float
+
+
+Light = SunLight | AreaLight
+
+
+@dataclass(frozen=True)
+class World:
+    """What surrounds everything, at infinity: an equirectangular picture that also lights the scene."""
+
+    environment: Texture
+    strength: float = 1.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A world, the rig that looks at it, and how many frames it is watched for."""
+
+    family: str
+    frames: int
+    camera: StereoCamera
+    objects: tuple[SceneObject, ...]
+    materials: tuple[Material, ...]
+    lights: tuple[Light, ...]
+    world: World
+    exposure_key: float = 0.18
+    """The image's mean reflectance-like level after automatic exposure, linear, 0..1 (0.18 is middle grey)."""
+    notes: dict[str, float] = field(default_factory=dict)
+    """Numbers the sampler wants kept beside the scene (not used for rendering)."""
+
+    def __post_init__(self) -> None:
+        for thing in self.objects:
+            if not 0 <= thing.material < len(self.materials):
+                raise ValueError(
+                    f"object {thing.name!r} wears material {thing.material} of {len(self.materials)}"
+                )
