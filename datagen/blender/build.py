@@ -1,0 +1,131 @@
+"""A Scene record to Blender objects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from datagen.blender.materials import build_material, image_from_array
+from scenes.spec import AreaLight, Light, Scene, SceneObject, StereoCamera, SunLight, World
+
+
+@dataclass(frozen=True)
+class BuiltWorld:
+    """A Scene standing in the open Blender file."""
+
+    scene: Scene
+    blender_scene: bpy.types.Scene
+    camera: bpy.types.Object
+    """One camera, moved from eye to eye."""
+    objects: tuple[bpy.types.Object, ...]
+    """In the order of `Scene.objects`."""
+
+
+def build_world(scene: Scene, blender_scene: bpy.types.Scene) -> BuiltWorld:
+    """Build everything in `scene` into an empty Blender file."""
+    materials = [build_material(f"material_{k}", item) for k, item in enumerate(scene.materials)]
+    objects = tuple(
+        _build_object(index, thing, scene, materials, blender_scene)
+        for index, thing in enumerate(scene.objects)
+    )
+    for index, light in enumerate(scene.lights):
+        _build_light(index, light, blender_scene)
+    _build_environment(scene.world, blender_scene)
+    camera = _build_camera(scene.camera, blender_scene)
+    return BuiltWorld(scene, blender_scene, camera, objects)
+
+
+def place(world: BuiltWorld, eye: str, time_frames: float) -> None:
+    """Put every object, and the camera for one eye, where they are at an instant."""
+    for thing, block in zip(world.scene.objects, world.objects, strict=True):
+        if len(thing.motion.times_frames) > 1:
+            block.matrix_world = Matrix(thing.pose(time_frames).tolist())
+    world.camera.matrix_world = Matrix(world.scene.camera.pose(eye, time_frames).tolist())
+    bpy.context.view_layer.update()
+
+
+def _build_object(
+    index: int,
+    thing: SceneObject,
+    scene: Scene,
+    materials: Sequence[bpy.types.Material],
+    blender_scene: bpy.types.Scene,
+) -> bpy.types.Object:
+    mesh = bpy.data.meshes.new(thing.name)
+    _fill_mesh(mesh, thing, scene.materials[thing.material].repeats)
+    mesh.materials.append(materials[thing.material])
+    block = bpy.data.objects.new(thing.name, mesh)
+    block.pass_index = index + 1
+    blender_scene.collection.objects.link(block)
+    block.matrix_world = Matrix(thing.pose(0.0).tolist())
+    return block
+
+
+def _fill_mesh(mesh: bpy.types.Mesh, thing: SceneObject, repeats: float) -> None:
+    data = thing.shape.mesh()
+    count = len(data.triangles)
+    mesh.vertices.add(len(data.vertices))
+    mesh.vertices.foreach_set("co", data.vertices.astype(np.float32).ravel())
+    mesh.loops.add(3 * count)
+    mesh.loops.foreach_set("vertex_index", data.triangles.astype(np.int32).ravel())
+    mesh.polygons.add(count)
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.full(count, data.smooth))
+    layer = mesh.uv_layers.new(name="uv")
+    layer.uv.foreach_set("vector", (data.corner_uv * np.float32(repeats)).astype(np.float32).ravel())
+    mesh.update(calc_edges=True)
+
+
+def _build_light(index: int, light: Light, blender_scene: bpy.types.Scene) -> None:
+    if isinstance(light, SunLight):
+        lamp = bpy.data.lights.new(f"sun_{index}", "SUN")
+        lamp.energy = light.irradiance
+        lamp.angle = np.deg2rad(light.angle_deg)
+        position, direction = Vector((0, 0, 0)), Vector(light.direction)
+    else:
+        assert isinstance(light, AreaLight)
+        lamp = bpy.data.lights.new(f"area_{index}", "AREA")
+        lamp.energy = light.power_w
+        lamp.size = light.size_m
+        position = Vector(light.position_m)
+        direction = Vector(light.target_m) - position
+    lamp.color = light.color
+    block = bpy.data.objects.new(lamp.name, lamp)
+    block.location = position
+    block.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
+    blender_scene.collection.objects.link(block)
+
+
+def _build_environment(world: World, blender_scene: bpy.types.Scene) -> None:
+    block = bpy.data.worlds.new("environment")
+    block.use_nodes = True
+    nodes, links = block.node_tree.nodes, block.node_tree.links
+    nodes.clear()
+    texture = nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image_from_array("environment", world.environment.image())
+    background = nodes.new("ShaderNodeBackground")
+    background.inputs["Strength"].default_value = world.strength
+    output = nodes.new("ShaderNodeOutputWorld")
+    links.new(texture.outputs["Color"], background.inputs["Color"])
+    links.new(background.outputs["Background"], output.inputs["Surface"])
+    blender_scene.world = block
+
+
+def _build_camera(camera: StereoCamera, blender_scene: bpy.types.Scene) -> bpy.types.Object:
+    lens = bpy.data.cameras.new("eye")
+    lens.sensor_fit = "HORIZONTAL"
+    lens.sensor_width = camera.sensor_width_mm
+    lens.lens = camera.focal_mm
+    # Anything in front of the eye counts: the nearest disparity allowed is the sampler's business.
+    lens.clip_start = 1e-3
+    lens.clip_end = 1e7
+    block = bpy.data.objects.new("eye", lens)
+    blender_scene.collection.objects.link(block)
+    blender_scene.camera = block
+    blender_scene.render.resolution_x = camera.width
+    blender_scene.render.resolution_y = camera.height
+    return block
