@@ -7,6 +7,7 @@ are registered subclasses, so a scene file can build data but never run code.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import is_dataclass
 from typing import Any, TypeVar
 
@@ -17,24 +18,29 @@ from cattrs.strategies import configure_tagged_union
 
 import scenes.shapes
 import scenes.textures
+from scenes.family import FamilyConfig
+from scenes.registry import FAMILIES
 from scenes.spec import Light, Scene, Shape, Texture
 
 T = TypeVar("T")
 
 
-def _tagged(converter: Converter, base: Any, kinds: dict[str, type]) -> None:
-    """Read and write any of `kinds` where the base class is asked for, its name under "kind"."""
+def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str = "kind") -> None:
+    """Read and write any of `kinds` where the base class is asked for, its name under `tag`."""
+    names = {kind: name for name, kind in kinds.items()}
 
     def structure(data: Any, _: Any) -> Any:
-        kind = kinds.get(data.get("kind")) if isinstance(data, dict) else None
+        kind = kinds.get(str(data.get(tag))) if isinstance(data, dict) else None
         if kind is None:
-            raise ValueError(f"expected a {base.__name__} with a known 'kind', got {str(data)[:80]!r}")
-        return converter.structure({key: value for key, value in data.items() if key != "kind"}, kind)
+            raise ValueError(
+                f"a {base.__name__} needs {tag!r}, one of {', '.join(kinds)}; got {str(data)[:80]!r}"
+            )
+        return converter.structure({key: value for key, value in data.items() if key != tag}, kind)
 
     converter.register_structure_hook_func(lambda cls: cls is base, structure)
     converter.register_unstructure_hook_func(
         lambda cls: cls is base,
-        lambda item: {"kind": type(item).__name__, **converter.unstructure(item, type(item))},
+        lambda item: {tag: names[type(item)], **converter.unstructure(item, type(item))},
     )
 
 
@@ -46,6 +52,7 @@ def _make_converter() -> Converter:
     )
     _tagged(converter, Shape, scenes.shapes.SHAPES)
     _tagged(converter, Texture, scenes.textures.TEXTURES)
+    _tagged(converter, FamilyConfig, {name: kind.config for name, kind in FAMILIES.items()}, tag="family")
     configure_tagged_union(Light, converter, tag_name="kind")
     return converter
 
@@ -53,9 +60,12 @@ def _make_converter() -> Converter:
 _converter = _make_converter()
 
 
-def to_plain(record: Any) -> Any:
-    """A record as dicts, lists, strings and numbers, ready for JSON or YAML."""
-    return json.loads(json.dumps(_converter.unstructure(record)))
+def to_plain(record: Any, kind: Any = None) -> Any:
+    """A record as dicts, lists, strings and numbers, ready for JSON or YAML.
+
+    Give `kind` where the reader will ask for a base class, so that the record's own class is written down.
+    """
+    return json.loads(json.dumps(_converter.unstructure(record, kind)))
 
 
 def from_plain(data: Any, kind: type[T]) -> T:
