@@ -1,0 +1,40 @@
+"""Pictures of stereo data and self-contained HTML pages to put them in.
+
+Used by the gallery of `datagen`, the image panels of `training` and the report of `refine`; imports none of
+them.
+"""
+
+from viewing.files import write_atomically
+from viewing.html import data_uri, render_page
+from viewing.pictures import (
+    Picture,
+    anaglyph,
+    confidence_picture,
+    disparity_picture,
+    enlarged,
+    error_picture,
+    gradient_picture,
+    index_picture,
+    occlusion_picture,
+    shrunk,
+    side_by_side,
+    stacked,
+)
+
+__all__ = [
+    "Picture",
+    "anaglyph",
+    "confidence_picture",
+    "data_uri",
+    "disparity_picture",
+    "enlarged",
+    "error_picture",
+    "gradient_picture",
+    "index_picture",
+    "occlusion_picture",
+    "render_page",
+    "shrunk",
+    "side_by_side",
+    "stacked",
+    "write_atomically",
+]

@@ -1,0 +1,119 @@
+"""Plots in one style, as inline SVG that follows the page's light or dark ink, or as a picture.
+
+No pyplot, hence no global figures: a plot is made, turned into text or pixels, and dropped.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from viewing.pictures import Picture
+
+SERIES_COLORS = ("#d1495b", "#00798c", "#edae49", "#7a5195", "#30638e", "#66a182", "#8d6a4f", "#888888")
+"""Distinct on white and on black, and for the common kinds of colour blindness in their brightness."""
+
+_INK = "#010203"
+"""A colour no plot uses otherwise: SVG output replaces it by `currentColor`, the ink of the page."""
+
+STYLE = {
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": _INK,
+    "axes.labelcolor": _INK,
+    "axes.titlesize": 10.0,
+    "axes.titlecolor": _INK,
+    "text.color": _INK,
+    "xtick.color": _INK,
+    "ytick.color": _INK,
+    "axes.linewidth": 0.7,
+    "lines.linewidth": 1.6,
+    "legend.frameon": False,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "stereoforge",
+}
+
+
+def new_plot(width_in: float = 5.6, height_in: float = 3.2) -> tuple[Figure, Axes]:
+    """An empty plot of a size in inches (100 pixels each on a screen at the usual zoom)."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        return figure, figure.add_subplot()
+
+
+def svg(figure: Figure) -> str:
+    """The figure as an `<svg>` element to put inside a page: no prolog, no external reference."""
+    buffer = io.StringIO()
+    with rc_context(STYLE):
+        figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    # In HTML an <svg> needs no namespace; without them the page holds no address that could be fetched.
+    text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text).replace("xlink:href", "href")
+    # Names of matplotlib's groups repeat from plot to plot, and nothing refers to them.
+    text = re.sub(r'<g id="[\w.]+_\d+">', "<g>", text)
+    return text.replace(_INK, "currentColor").strip()
+
+
+def pixels(figure: Figure, dots_per_inch: float = 110.0) -> Picture:
+    """The figure drawn on white, (H, W, 3) uint8."""
+    figure.set_dpi(dots_per_inch)
+    canvas = FigureCanvasAgg(figure)
+    with rc_context(STYLE):
+        canvas.draw()
+    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
+
+
+def curves(
+    series: Mapping[str, tuple[ArrayLike, ArrayLike]],
+    x_label: str,
+    y_label: str,
+    title: str = "",
+    dashed: Sequence[str] = (),
+    marker: str | None = None,
+) -> Figure:
+    """Named curves (x, y) in one plot; those in `dashed` are references, drawn thin and dashed in grey."""
+    figure, axes = new_plot()
+    colors = iter(SERIES_COLORS * (1 + len(series) // len(SERIES_COLORS)))
+    with rc_context(STYLE):
+        for name, (x, y) in series.items():
+            if name in dashed:
+                axes.plot(x, y, color="#888888", linestyle=(0, (4, 3)), linewidth=1.1, label=name)
+            else:
+                axes.plot(x, y, color=next(colors), label=name, marker=marker, markersize=3)
+        _labelled(axes, x_label, y_label, title, legend=len(series) > 1)
+    return figure
+
+
+def histogram(
+    edges: ArrayLike, shares: Mapping[str, ArrayLike], x_label: str, y_label: str, title: str = ""
+) -> Figure:
+    """Named histograms over common bin `edges` (N + 1), each given as N heights: outlines over areas."""
+    figure, axes = new_plot()
+    with rc_context(STYLE):
+        for (name, heights), color in zip(shares.items(), SERIES_COLORS, strict=False):
+            axes.stairs(heights, edges, color=color, label=name, linewidth=1.3)
+            axes.stairs(heights, edges, color=color, fill=True, alpha=0.18)
+        _labelled(axes, x_label, y_label, title, legend=len(shares) > 1)
+    return figure
+
+
+def _labelled(axes: Axes, x_label: str, y_label: str, title: str, legend: bool) -> None:
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    axes.set_title(title, loc="left")
+    axes.grid(True, color="#888888", alpha=0.25, linewidth=0.6)
+    axes.set_ylim(bottom=0)
+    if legend:
+        axes.legend()
