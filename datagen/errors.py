@@ -1,0 +1,11 @@
+"""The errors a user of a data set can cause; each message is one sentence that names the file or folder."""
+
+from __future__ import annotations
+
+
+class DatasetError(ValueError):
+    """A data set, or a part of it, is missing, incomplete or contradicts itself."""
+
+
+class FormatError(DatasetError):
+    """A file's bytes are not what its format allows, or an array cannot be stored in the format."""

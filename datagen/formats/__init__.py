@@ -1,0 +1,25 @@
+"""The files a data set is made of, one module a format.
+
+Every reader checks the header, and that the file has exactly the bytes the header promises, before it
+allocates anything; whatever is wrong raises `datagen.errors.FormatError`, one sentence that names the file.
+Every writer replaces its target in one step and gives the same bytes for the same array.
+"""
+
+from datagen.formats.camera_data import read_camera_data, write_camera_data
+from datagen.formats.gradient_exr import read_gradient, write_gradient
+from datagen.formats.occlusion import read_occlusion, write_occlusion
+from datagen.formats.pfm import read_pfm, write_pfm
+from datagen.formats.png import read_png, write_png
+
+__all__ = [
+    "read_camera_data",
+    "read_gradient",
+    "read_occlusion",
+    "read_pfm",
+    "read_png",
+    "write_camera_data",
+    "write_gradient",
+    "write_occlusion",
+    "write_pfm",
+    "write_png",
+]

@@ -1,0 +1,77 @@
+"""Camera poses as text, in the format of FlyingThings3D's `camera_data.txt`.
+
+    Frame 6
+    L T00 T01 ... T33
+    R T00 T01 ... T33
+
+and an empty line after each frame; T is the row-major (4, 4) camera-to-world matrix of that eye.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.atomic import write_bytes
+from datagen.errors import FormatError
+from datagen.formats.limits import read_bounded
+
+Matrix = NDArray[np.float64]
+
+
+def write_camera_data(path: Path | str, poses: Mapping[int, tuple[Matrix, Matrix]]) -> None:
+    """Write the (left, right) camera-to-world matrices of each frame number, exact to the last bit."""
+    path = Path(path)
+    blocks = []
+    for frame, (left, right) in sorted(poses.items()):
+        if left.shape != (4, 4) or right.shape != (4, 4):
+            raise FormatError(
+                f"{path}: the poses of frame {frame} are {left.shape} and {right.shape}, not (4, 4)"
+            )
+        blocks.append(f"Frame {frame}\nL {_numbers(left)}\nR {_numbers(right)}\n\n")
+    write_bytes(path, "".join(blocks).encode("ascii"))
+
+
+def read_camera_data(path: Path | str) -> dict[int, tuple[Matrix, Matrix]]:
+    """Read the (left, right) camera-to-world matrices, (4, 4), by frame number. Raises FormatError."""
+    path = Path(path)
+    try:
+        text = read_bounded(path).decode("ascii")
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{path}: camera data is text, but byte {error.start} is not") from error
+    lines = [line for line in text.splitlines() if line.strip()]
+    if len(lines) % 3:
+        raise FormatError(f"{path}: camera data has three lines a frame, but there are {len(lines)}")
+    poses: dict[int, tuple[Matrix, Matrix]] = {}
+    for start in range(0, len(lines), 3):
+        heading = lines[start].split()
+        if len(heading) != 2 or heading[0] != "Frame" or not heading[1].isdigit():
+            raise FormatError(f"{path}: expected 'Frame <number>', got {lines[start][:40]!r}")
+        frame = int(heading[1])
+        if frame in poses:
+            raise FormatError(f"{path}: frame {frame} occurs twice")
+        poses[frame] = (
+            _matrix(path, frame, "L", lines[start + 1]),
+            _matrix(path, frame, "R", lines[start + 2]),
+        )
+    return poses
+
+
+def _numbers(matrix: Matrix) -> str:
+    return " ".join(repr(float(value)) for value in matrix.flat)
+
+
+def _matrix(path: Path, frame: int, eye: str, line: str) -> Matrix:
+    words = line.split()
+    try:
+        if words[0] != eye:
+            raise ValueError(f"it begins with {words[0][:20]!r}")
+        matrix = np.array([float(word) for word in words[1:]]).reshape(4, 4)
+        if not np.isfinite(matrix).all():
+            raise ValueError("it is not finite")
+    except ValueError as error:
+        raise FormatError(f"{path}: frame {frame} has no valid {eye!r} matrix: {error}") from error
+    return matrix

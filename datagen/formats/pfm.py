@@ -1,0 +1,64 @@
+"""Portable float maps: the disparity files of FlyingThings3D, Middlebury and ETH3D.
+
+A text header of three words (`Pf` one channel or `PF` three; width and height; a scale whose sign tells the
+byte order, negative for little endian), then float32 rows from the bottom of the image to the top
+(P. Debevec's format, pauldebevec.com/Research/HDR/PFM).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.atomic import write_bytes
+from datagen.errors import FormatError
+from datagen.formats.limits import check_image_size, read_bounded
+
+_HEADER = re.compile(rb"(P[fF])\s{1,8}(\d{1,9})\s{1,8}(\d{1,9})\s{1,8}(\S{1,32})\s")
+
+
+def read_pfm(path: Path | str) -> NDArray[np.float32]:
+    """Read a float map: (H, W) or (H, W, 3) float32, row 0 at the top.
+
+    The scale's magnitude is not applied: Middlebury writes 1/255 there above disparities that are in
+    pixels already, and no stereo benchmark's reader multiplies by it. Raises FormatError.
+    """
+    path = Path(path)
+    data = read_bounded(path)
+    header = _HEADER.match(data)
+    if header is None:
+        raise FormatError(f"{path}: is not a PFM file, its header does not parse")
+    kind, width, height, channels = header[1], int(header[2]), int(header[3]), 3 if header[1] == b"PF" else 1
+    check_image_size(path, width, height, channels)
+    scale = _parse_scale(path, header[4])
+    expected = header.end() + 4 * width * height * channels
+    if len(data) != expected:
+        raise FormatError(f"{path}: has {len(data)} bytes where its header promises {expected}")
+    values = np.frombuffer(data, "<f4" if scale < 0 else ">f4", offset=header.end())
+    rows = values.reshape((height, width, 3) if kind == b"PF" else (height, width))
+    return np.ascontiguousarray(rows[::-1], np.float32)
+
+
+def write_pfm(path: Path | str, array: NDArray[np.floating[Any]]) -> None:
+    """Write (H, W) or (H, W, 3) numbers, row 0 at the top, as little-endian float32 of scale -1."""
+    path = Path(path)
+    if array.size == 0 or not (array.ndim == 2 or (array.ndim == 3 and array.shape[2] == 3)):
+        raise FormatError(f"{path}: a PFM file holds (H, W) or (H, W, 3) numbers, not {array.shape}")
+    kind = "PF" if array.ndim == 3 else "Pf"
+    header = f"{kind}\n{array.shape[1]} {array.shape[0]}\n-1.0\n".encode("ascii")
+    write_bytes(path, header + np.ascontiguousarray(array[::-1], "<f4").tobytes())
+
+
+def _parse_scale(path: Path, word: bytes) -> float:
+    try:
+        scale = float(word)
+    except ValueError:
+        scale = math.nan
+    if not math.isfinite(scale) or scale == 0:
+        raise FormatError(f"{path}: the scale in its header is {word!r}, which gives no byte order")
+    return scale

@@ -1,0 +1,112 @@
+"""Where everything of a data set lies: the FlyingThings3D tree, and more beside it.
+
+    recipe.yaml
+    frames_cleanpass/TRAIN/A/0003/left/0006.png     one file an eye and frame
+    camera_data/TRAIN/A/0003/camera_data.txt        one file a scene
+    scenes/TRAIN/A/0003.json                        the Scene record
+    manifest/TRAIN/A/0003.json                      written last: a scene is there if its manifest is
+
+Frames are numbered from `FIRST_FRAME`, as in FlyingThings3D; that file shows the scene at the instant t = 0.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from datagen.errors import DatasetError
+
+SPLITS = ("train", "val", "test")
+EYES = ("left", "right")
+FIRST_FRAME = 6
+LETTER = "A"
+"""FlyingThings3D groups its scenes in A, B and C; all of ours are in the first group."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of data file: the top folder that holds it and how its files are called."""
+
+    folder: str
+    extension: str
+    per_eye: bool = True
+    """One file an eye and frame; otherwise one file a scene, named after the kind."""
+
+
+KINDS = {
+    kind.folder: kind
+    for kind in (
+        Kind("frames_cleanpass", ".png"),
+        Kind("frames_finalpass", ".png"),
+        Kind("disparity", ".pfm"),
+        Kind("disparity_gradient", ".exr"),
+        Kind("occlusion", ".png"),
+        Kind("object_index", ".png"),
+        Kind("camera_data", ".txt", per_eye=False),
+    )
+}
+"""Every kind of data file by its name, which is also its folder's."""
+TARGETS = ("disparity", "disparity_gradient", "occlusion", "object_index", "camera_data")
+"""The kinds every scene has, whichever passes were rendered."""
+RENDER_PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
+
+_RECORD_NAME = re.compile(r"(\d{4}|[1-9]\d{4,})\.json")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The paths of a data set under its root folder; nothing here touches the disk but `committed_scenes`."""
+
+    root: Path
+
+    def scene_folder(self, kind: str, split: str, scene: int) -> Path:
+        """The folder of one kind of file of one scene, for example root/disparity/TRAIN/A/0003."""
+        return self._group(KINDS[kind].folder, split) / _number(scene)
+
+    def file(
+        self, kind: str, split: str, scene: int, eye: str | None = None, frame: int | None = None
+    ) -> Path:
+        """A data file. Kinds with files an eye need `eye` and the frame's number (`FIRST_FRAME` + t)."""
+        entry, folder = KINDS[kind], self.scene_folder(kind, split, scene)
+        if not entry.per_eye:
+            return folder / f"{entry.folder}{entry.extension}"
+        if eye not in EYES or frame is None or frame < FIRST_FRAME:
+            raise ValueError(
+                f"a file of {kind} needs an eye of {EYES} and a frame from {FIRST_FRAME} up, "
+                f"got {eye!r} and {frame}"
+            )
+        return folder / eye / f"{_number(frame)}{entry.extension}"
+
+    def scene_record(self, split: str, scene: int) -> Path:
+        return self._group("scenes", split) / f"{_number(scene)}.json"
+
+    def manifest(self, split: str, scene: int) -> Path:
+        return self._group("manifest", split) / f"{_number(scene)}.json"
+
+    @property
+    def recipe(self) -> Path:
+        return self.root / "recipe.yaml"
+
+    def committed_scenes(self, split: str) -> list[int]:
+        """The numbers of the scenes that are whole, ascending: those that have a manifest."""
+        folder = self._group("manifest", split)
+        if not folder.is_dir():
+            return []
+        names = (_RECORD_NAME.fullmatch(path.name) for path in folder.iterdir())
+        return sorted(int(name[1]) for name in names if name)
+
+    def relative(self, path: Path) -> str:
+        """A path under the root as the manifest writes it: relative, with forward slashes."""
+        return path.relative_to(self.root).as_posix()
+
+    def _group(self, folder: str, split: str) -> Path:
+        if split not in SPLITS:
+            raise DatasetError(f"{self.root}: there is no split {split!r}; there are {', '.join(SPLITS)}")
+        return self.root / folder / split.upper() / LETTER
+
+
+def _number(value: int) -> str:
+    if value < 0:
+        raise ValueError(f"scenes and frames are numbered from 0, got {value}")
+    return f"{value:04d}"

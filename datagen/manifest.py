@@ -1,0 +1,108 @@
+"""A scene's manifest: every file of it with size and SHA-256. Written last, it makes the scene exist."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import asdict, dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any, TypeVar
+
+from datagen.atomic import write_bytes
+from datagen.errors import DatasetError
+from datagen.formats.limits import read_bounded
+
+T = TypeVar("T")
+
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class FileEntry:
+    """One file as it was when the scene was committed."""
+
+    path: str
+    """Relative to the data set's root, with forward slashes; never leaves the root."""
+    size: int
+    """Bytes."""
+    sha256: str
+    """64 lower-case hexadecimal digits."""
+
+    def __post_init__(self) -> None:
+        parts = PurePosixPath(self.path).parts
+        if not parts or self.path.startswith("/") or ".." in parts or re.search(r"[\\:\0]", self.path):
+            raise DatasetError(f"a manifest's path must stay below the data set's folder, got {self.path!r}")
+        if self.size < 0 or not _SHA256.fullmatch(self.sha256):
+            raise DatasetError(f"{self.path}: {self.size} bytes with SHA-256 {self.sha256!r} cannot be")
+
+
+@dataclass(frozen=True)
+class SceneManifest:
+    """What a committed scene consists of and how it came to be."""
+
+    family: str
+    split: str
+    scene: int
+    recipe_sha256: str
+    files: tuple[FileEntry, ...]
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Wall time of each step."""
+    statistics: dict[str, Any] = field(default_factory=dict)
+    """Numbers about the scene's frames."""
+    versions: dict[str, str] = field(default_factory=dict)
+    """Of the software that made it."""
+
+
+def file_entry(root: Path, path: Path) -> FileEntry:
+    """Measure the file at `path`, which lies under `root`."""
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        size = file.tell()
+    return FileEntry(path=path.relative_to(root).as_posix(), size=size, sha256=digest)
+
+
+def write_manifest(path: Path, manifest: SceneManifest) -> None:
+    """Commit a scene: all its files must be in place before."""
+    write_bytes(path, (json.dumps(asdict(manifest), indent=1) + "\n").encode("utf-8"))
+
+
+def read_manifest(path: Path) -> SceneManifest:
+    """Read a manifest. Raises DatasetError with one sentence for a file that is not one."""
+    try:
+        data = json.loads(read_bounded(path))
+        files = tuple(_typed(FileEntry, _FILE_TYPES, entry) for entry in _as_list(data.pop("files")))
+        return _typed(SceneManifest, _MANIFEST_TYPES, data | {"files": files})
+    except DatasetError as error:
+        raise DatasetError(f"{path}: {error}" if str(path) not in str(error) else str(error)) from error
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise DatasetError(f"{path}: is not a scene's manifest ({error})") from error
+
+
+_FILE_TYPES: dict[str, type] = {"path": str, "size": int, "sha256": str}
+_MANIFEST_TYPES: dict[str, type] = {
+    "family": str,
+    "split": str,
+    "scene": int,
+    "recipe_sha256": str,
+    "files": tuple,
+    "seconds": dict,
+    "statistics": dict,
+    "versions": dict,
+}
+
+
+def _as_list(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise TypeError("its files are not a list")
+    return value
+
+
+def _typed(record: type[T], types: dict[str, type], data: dict[str, Any]) -> T:
+    """Build `record` from exactly the named fields, none of them converted from another type."""
+    if data.keys() != types.keys():
+        raise TypeError(f"its fields are {', '.join(map(str, data))}")
+    for name, kind in types.items():
+        if type(data[name]) is not kind:
+            raise TypeError(f"{name} is {str(data[name])[:40]!r}, which is no {kind.__name__}")
+    return record(**data)
