@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeVar
 
-from datagen.atomic import write_bytes
+from datagen.formats.atomic import write_text
 from datagen.errors import DatasetError
 from datagen.formats.limits import read_bounded
 
@@ -64,7 +64,7 @@ def file_entry(root: Path, path: Path) -> FileEntry:
 
 def write_manifest(path: Path, manifest: SceneManifest) -> None:
     """Commit a scene: all its files must be in place before."""
-    write_bytes(path, (json.dumps(asdict(manifest), indent=1) + "\n").encode("utf-8"))
+    write_text(path, json.dumps(asdict(manifest), indent=1) + "\n")
 
 
 def read_manifest(path: Path) -> SceneManifest:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.atomic import write_bytes
+from datagen.formats.atomic import write_bytes
 from datagen.errors import FormatError
 from datagen.formats.limits import read_bounded
 

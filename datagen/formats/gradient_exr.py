@@ -14,7 +14,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from datagen.atomic import replacing
+from datagen.formats.atomic import replacing
 from datagen.errors import FormatError
 from datagen.formats.limits import check_image_size, read_bounded
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.atomic import write_bytes
+from datagen.formats.atomic import write_bytes
 from datagen.errors import FormatError
 from datagen.formats.limits import check_image_size, read_bounded
 

@@ -32,3 +32,8 @@ def write_bytes(path: Path, data: bytes) -> None:
     """Replace the whole content of `path` in one step."""
     with replacing(path) as temporary:
         temporary.write_bytes(data)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replace the whole content of `path` by UTF-8 text with Unix line ends in one step."""
+    write_bytes(path, text.encode("utf-8"))
