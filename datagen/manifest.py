@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeVar
 
-from datagen.formats.atomic import write_text
 from datagen.errors import DatasetError
+from datagen.formats.atomic import write_text
 from datagen.formats.limits import read_bounded
 
 T = TypeVar("T")

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats.atomic import write_bytes
 from datagen.errors import FormatError
+from datagen.formats.atomic import write_bytes
 from datagen.formats.limits import read_bounded
 
 Matrix = NDArray[np.float64]

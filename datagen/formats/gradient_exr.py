@@ -14,8 +14,8 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from datagen.formats.atomic import replacing
 from datagen.errors import FormatError
+from datagen.formats.atomic import replacing
 from datagen.formats.limits import check_image_size, read_bounded
 
 _CHANNELS = ("dx", "dy", "valid")

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats.atomic import write_bytes
 from datagen.errors import FormatError
+from datagen.formats.atomic import write_bytes
 from datagen.formats.limits import check_image_size, read_bounded
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
