@@ -1,0 +1,17 @@
+"""How a world becomes a sample: scenes rendered in Blender, exact ground truth, data sets on disk."""
+
+from datagen.dataset import StereoDataset, StereoSample
+from datagen.errors import DatasetError, FormatError
+from datagen.recipe import Recipe, read_recipe
+from datagen.render import RenderSummary, render_dataset
+
+__all__ = [
+    "DatasetError",
+    "FormatError",
+    "Recipe",
+    "RenderSummary",
+    "StereoDataset",
+    "StereoSample",
+    "read_recipe",
+    "render_dataset",
+]

@@ -1,0 +1,140 @@
+"""A Scene to arrays: both eyes' pictures and exact ground truth, frame by frame."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.exposure import automatic_exposure, develop
+from datagen.ground_truth import (
+    EYES,
+    Eye,
+    OcclusionTester,
+    RectifiedPair,
+    disparity_from_depth,
+    forward_differences,
+    gradient_validity,
+    to_camera_frame,
+)
+from scenes import Scene
+
+BLENDER_LOG = "blender.log"
+LOG_LINES_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class EyeTargets:
+    """One eye's picture and ground truth, as they are stored."""
+
+    image: NDArray[np.uint8]
+    """(H, W, 3) sRGB."""
+    disparity: NDArray[np.float32]
+    """(H, W) px."""
+    gradient: NDArray[np.float32]
+    """(H, W, 2) forward differences [dx, dy] of the disparity."""
+    gradient_valid: NDArray[np.bool_]
+    """(H, W)."""
+    occlusion: NDArray[np.uint8]
+    """(H, W) 0 visible, 1 occluded, 2 out of the other frame."""
+    object_index: NDArray[np.uint16]
+    """(H, W) 0 where nothing is hit, else 1 + the index in `Scene.objects`."""
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """How a Scene becomes arrays."""
+
+    samples: int = 4
+    """Paths a pixel; ground truth is exact whatever this is."""
+    device: str = "cpu"
+    threads: int = 1
+    gradient_threshold_px: float = 1.0
+    """Larger forward differences are discontinuities: invalid as gradient targets."""
+
+
+@dataclass
+class Stopwatch:
+    """Wall seconds by step."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = round(self.seconds.get(name, 0.0) + time.perf_counter() - start, 4)
+
+
+class BlenderFailure(RuntimeError):
+    """Blender could not render a scene; the message carries the end of its log."""
+
+
+def render_frames(
+    scene: Scene, scratch: Path, options: RenderOptions | None = None, watch: Stopwatch | None = None
+) -> Iterator[tuple[int, dict[Eye, EyeTargets]]]:
+    """Yield (frame, both eyes' arrays) for every frame of a scene, frames counted from 0.
+
+    scratch: an existing folder for Blender's temporary files and its log. Blender keeps one world a process,
+    so one iterator at a time. Raises BlenderFailure, and RuntimeError on a Python without bpy.
+    """
+    # Imported here so that planning, verifying and training work on a Python without Blender.
+    from datagen.blender.build import build_world, place
+    from datagen.blender.geometry import evaluated_triangles
+    from datagen.blender.session import CyclesSettings, quiet, start_empty_file
+    from datagen.blender.view import render_view
+
+    options, watch = options or RenderOptions(), watch or Stopwatch()
+    log = scratch / BLENDER_LOG
+    exposure: float | None = None
+    try:
+        with watch.step("build"), quiet(log):
+            settings = CyclesSettings(options.samples, options.device, options.threads)
+            world = build_world(scene, start_empty_file(settings))
+        for frame in range(scene.frames):
+            with watch.step("render"), quiet(log):
+                views = {eye: render_view(world, eye, frame, scratch) for eye in EYES}
+            with watch.step("ground_truth"):
+                place(world, "left", frame)
+                tester = _occlusion_tester(scene, frame, evaluated_triangles())
+                if exposure is None:  # One exposure a scene: a camera does not flicker.
+                    exposure = automatic_exposure(views["left"].radiance, scene.exposure_key)
+                targets = {
+                    eye: _targets(
+                        develop(view.radiance, exposure),
+                        disparity_from_depth(view.depth_m, scene.camera.disparity_metres),
+                        options.gradient_threshold_px,
+                        tester.labels(eye, view.depth_m),
+                        view.object_index,
+                    )
+                    for eye, view in views.items()
+                }
+            yield frame, targets
+    except RuntimeError as error:
+        tail = " | ".join(log.read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:])
+        raise BlenderFailure(f"{error}; Blender's last words: {tail}") from error
+
+
+def _targets(
+    image: NDArray[np.uint8],
+    disparity: NDArray[np.float32],
+    gradient_threshold_px: float,
+    occlusion: NDArray[np.uint8],
+    object_index: NDArray[np.uint16],
+) -> EyeTargets:
+    gradient = forward_differences(disparity)
+    valid = gradient_validity(gradient, gradient_threshold_px)
+    return EyeTargets(image, disparity, gradient, valid, occlusion, object_index)
+
+
+def _occlusion_tester(scene: Scene, frame: int, triangles: NDArray[np.float64]) -> OcclusionTester:
+    camera = scene.camera
+    pair = RectifiedPair(camera.width, camera.height, camera.focal_px, camera.baseline_m)
+    return OcclusionTester(to_camera_frame(triangles, camera.pose("left", frame)), pair)

@@ -1,0 +1,120 @@
+"""The recipe of a data set: all that decides its bytes, as a typed record and as `recipe.yaml`."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from datagen.errors import DatasetError
+from datagen.formats.atomic import write_text
+from datagen.layout import SPLITS
+from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
+from scenes.serialization import from_plain, to_plain
+
+PASSES = ("clean",)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What to render. Two runs of one recipe give the same bytes, however the work is spread."""
+
+    world: FamilyConfig
+    """The family's own config; the image size and the frames a scene are in it."""
+    scenes: dict[str, int]
+    """How many scenes each split has."""
+    seed: int = 0
+    samples: int = 4
+    """Paths a pixel for the pictures; ground truth is exact whatever this is."""
+    passes: tuple[str, ...] = ("clean",)
+    gradient_threshold_px: float = 1.0
+    """Jumps above this are discontinuities, masked out of the gradient targets."""
+
+    def __post_init__(self) -> None:
+        for split, count in self.scenes.items():
+            if split not in SPLITS:
+                raise DatasetError(f"there is no split {split!r}; there are {', '.join(SPLITS)}")
+            if count < 0:
+                raise DatasetError(f"the number of {split} scenes must not be negative, got {count}")
+        if not self.passes or not set(self.passes) <= set(PASSES):
+            raise DatasetError(f"passes must be among {', '.join(PASSES)}, got {', '.join(self.passes)!r}")
+        at_least_one = {
+            "samples": self.samples,
+            "width": self.world.width,
+            "height": self.world.height,
+            "frames per scene": self.world.frames,
+        }
+        for name, value in at_least_one.items():
+            if value < 1:
+                raise DatasetError(f"{name} must be at least 1, got {value}")
+        if self.seed < 0:
+            raise DatasetError(f"the seed must not be negative, got {self.seed}")
+
+    @property
+    def family(self) -> str:
+        return next(name for name, family in FAMILIES.items() if type(self.world) is family.config)
+
+    def settings_sha256(self) -> str:
+        """Identifies everything but the numbers of scenes, which may grow."""
+        settings = to_plain(replace(self, scenes={}))
+        return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
+
+    def sample(self, split: str, index: int) -> Scene:
+        """The index-th scene of a split; splits and scenes draw from unrelated random streams."""
+        sequence = np.random.SeedSequence(self.seed, spawn_key=(SPLITS.index(split), index))
+        return sample_scene(np.random.default_rng(sequence), self.family, self.world)
+
+
+def recipe_from_plain(data: Any, origin: str) -> Recipe:
+    """Raises DatasetError naming `origin` for anything that is not a recipe."""
+    try:
+        return from_plain(data, Recipe)
+    except ValueError as error:
+        raise DatasetError(f"{origin} is not a valid recipe: {error}") from error
+
+
+def read_recipe(path: Path) -> Recipe:
+    """Raises DatasetError for a file that is missing, no YAML, or no recipe."""
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise DatasetError(f"there is no recipe {path}") from error
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise DatasetError(f"cannot read the recipe {path}: {' '.join(str(error).split())}") from error
+    return recipe_from_plain(data, str(path))
+
+
+def write_recipe(path: Path, recipe: Recipe) -> None:
+    write_text(path, yaml.safe_dump(to_plain(recipe), sort_keys=False))
+
+
+def merge_into(existing: Recipe, wanted: Recipe, folder: Path) -> Recipe:
+    """The recipe of a folder that already has one: scenes may be added, nothing else may change.
+
+    Raises DatasetError naming the first setting that differs.
+    """
+    before, after = (_flat(to_plain(replace(recipe, scenes={}))) for recipe in (existing, wanted))
+    for key in sorted(set(before) | set(after)):
+        if before.get(key) != after.get(key):
+            raise DatasetError(
+                f"{folder} was rendered with {key} {before.get(key)}, not {after.get(key)}: "
+                "use the same settings to finish or extend it, or another folder"
+            )
+    splits = [split for split in SPLITS if split in existing.scenes or split in wanted.scenes]
+    counts = {split: max(existing.scenes.get(split, 0), wanted.scenes.get(split, 0)) for split in splits}
+    return replace(existing, scenes=counts)
+
+
+def _flat(data: Any, prefix: str = "") -> dict[str, Any]:
+    if not isinstance(data, dict):
+        return {prefix: data}
+    return {
+        name: value
+        for key, item in data.items()
+        for name, value in _flat(item, f"{prefix}.{key}" if prefix else key).items()
+    }

@@ -1,0 +1,144 @@
+"""One scene from recipe to committed files: what a worker process does."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from datagen.formats import write_camera_data, write_gradient, write_occlusion, write_pfm, write_png
+from datagen.formats.atomic import write_text
+from datagen.frames import BLENDER_LOG, EyeTargets, RenderOptions, Stopwatch, render_frames
+from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, Eye
+from datagen.layout import EYES, FIRST_FRAME, Layout
+from datagen.manifest import SceneManifest, file_entry, write_manifest
+from datagen.recipe import Recipe
+from scenes import Scene, scene_to_json
+
+STAGING_FOLDER = ".staging"
+
+
+@dataclass(frozen=True)
+class SceneJob:
+    """One scene to render, and with what."""
+
+    root: Path
+    recipe: Recipe
+    split: str
+    scene: int
+    device: str = "cpu"
+    threads: int = 1
+
+    @property
+    def name(self) -> str:
+        return f"{self.split}/{self.scene:04d}"
+
+    @property
+    def staging(self) -> Path:
+        return self.root / STAGING_FOLDER / f"{self.split}-{self.scene:04d}"
+
+
+def render_scene(job: SceneJob) -> SceneManifest:
+    """Render, measure and commit one scene.
+
+    Everything is written under a staging folder first and moved into place at the end, the manifest last,
+    so that a scene with a manifest is whole whatever happens.
+    """
+    shutil.rmtree(job.staging, ignore_errors=True)
+    job.staging.mkdir(parents=True)
+    try:
+        return _render_staged(job, Stopwatch())
+    finally:
+        shutil.rmtree(job.staging, ignore_errors=True)
+
+
+def _render_staged(job: SceneJob, watch: Stopwatch) -> SceneManifest:
+    staged = Layout(job.staging)
+    with watch.step("sample"):
+        scene = job.recipe.sample(job.split, job.scene)
+    options = RenderOptions(job.recipe.samples, job.device, job.threads, job.recipe.gradient_threshold_px)
+    statistics = []
+    for frame, targets in render_frames(scene, job.staging, options, watch):
+        with watch.step("write"):
+            for eye, arrays in targets.items():
+                _write_eye(staged, job, eye, FIRST_FRAME + frame, arrays)
+            statistics.append(_frame_statistics(targets["left"]))
+    with watch.step("write"):
+        _write_scene_files(staged, job, scene)
+    (job.staging / BLENDER_LOG).unlink()
+    return _commit(job, watch, _scene_statistics(scene, statistics))
+
+
+def _write_eye(layout: Layout, job: SceneJob, eye: Eye, number: int, arrays: EyeTargets) -> None:
+    def path(kind: str) -> Path:
+        return layout.file(kind, job.split, job.scene, eye, number)
+
+    write_png(path("frames_cleanpass"), arrays.image)
+    write_pfm(path("disparity"), arrays.disparity)
+    write_gradient(path("disparity_gradient"), arrays.gradient, arrays.gradient_valid)
+    write_occlusion(path("occlusion"), arrays.occlusion)
+    write_png(path("object_index"), arrays.object_index)
+
+
+def _write_scene_files(layout: Layout, job: SceneJob, scene: Scene) -> None:
+    poses = {
+        FIRST_FRAME + frame: (scene.camera.pose("left", frame), scene.camera.pose("right", frame))
+        for frame in range(scene.frames)
+    }
+    write_camera_data(layout.file("camera_data", job.split, job.scene), poses)
+    write_text(layout.scene_record(job.split, job.scene), scene_to_json(scene))
+
+
+def _frame_statistics(left: EyeTargets) -> dict[str, float]:
+    low, middle, high = np.percentile(left.disparity, (1, 50, 99))
+    return {
+        "disparity_p01_px": float(low),
+        "disparity_median_px": float(middle),
+        "disparity_p99_px": float(high),
+        "occluded_share": float((left.occlusion == OCCLUDED).mean()),
+        "out_of_frame_share": float((left.occlusion == OUT_OF_FRAME).mean()),
+        "gradient_valid_share": float(left.gradient_valid.mean()),
+        "mean_level": float(left.image.mean()),
+        "visible_objects": float(np.count_nonzero(np.unique(left.object_index))),
+    }
+
+
+def _scene_statistics(scene: Scene, frames: list[dict[str, float]]) -> dict[str, Any]:
+    """Counts, and the means over the frames of what was measured in the left eye."""
+    means = {key: round(float(np.mean([frame[key] for frame in frames])), 5) for key in frames[0]}
+    return {"objects": len(scene.objects), "frames": scene.frames, **means}
+
+
+def _commit(job: SceneJob, watch: Stopwatch, statistics: dict[str, Any]) -> SceneManifest:
+    """Move the staged scene into the data set and make it exist by writing its manifest."""
+    from datagen.blender.session import blender_version
+
+    files = sorted(path for path in job.staging.rglob("*") if path.is_file())
+    manifest = SceneManifest(
+        family=job.recipe.family,
+        split=job.split,
+        scene=job.scene,
+        recipe_sha256=job.recipe.settings_sha256(),
+        files=tuple(file_entry(job.staging, path) for path in files),
+        seconds=watch.seconds,
+        statistics=statistics,
+        versions={"blender": blender_version(), "numpy": np.__version__},
+    )
+    for source in sorted({_unit(path) for path in files}):
+        target = job.root / source.relative_to(job.staging)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.is_dir():  # Left by a run that was killed between moving and writing the manifest.
+            shutil.rmtree(target)
+        source.replace(target)
+    write_manifest(Layout(job.root).manifest(job.split, job.scene), manifest)
+    return manifest
+
+
+def _unit(path: Path) -> Path:
+    """What is moved as a whole for a staged file: a scene's folder, or the scene's single record."""
+    if path.parent.name in EYES:
+        return path.parent.parent
+    return path if path.suffix == ".json" else path.parent
