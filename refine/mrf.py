@@ -1,0 +1,186 @@
+"""Refining a disparity map by the continuous MRF (Cheng, He, Zhang, Pattern Recognition 74, 2018, Sec.
+3.3)."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import distance_transform_edt
+
+from refine.parameters import MRFParameters
+from refine.solvers import LinearSolution, solve_cg, solve_direct, solve_multigrid
+from refine.system import Form, MRFSystem, build_system
+from refine.weights import Floats
+
+SolverName = Literal["auto", "multigrid", "cg", "direct"]
+
+DEFAULT_TOLERANCE = 1e-5
+"""Relative residual at which the iterative solvers stop."""
+
+_SOLVERS = {"multigrid": solve_multigrid, "cg": solve_cg, "direct": solve_direct}
+_DIRECT_UP_TO_PIXELS = 4096
+"""Up to this size "auto" takes the direct solver: below a few milliseconds either way, and exact."""
+
+
+class ConvergenceWarning(UserWarning):
+    """An iterative solver stopped short of its tolerance, and the direct solver was used instead."""
+
+
+@dataclass(frozen=True)
+class SolveInfo:
+    """How a refinement was computed."""
+
+    solver: str
+    """The solver that gave the result: "multigrid", "cg" or "direct"."""
+    iterations: int
+    relative_residual: float
+    seconds: float
+    """Wall-clock time, weights and set-up included."""
+    fell_back: bool
+    """Whether the solver asked for did not converge, and the direct one took over."""
+
+
+@dataclass(frozen=True)
+class MRFSolution:
+    """A refined disparity map in full precision."""
+
+    disparity: Floats
+    """(H, W) float64, pixels."""
+    info: SolveInfo
+
+
+def refine_disparity(
+    disparity: ArrayLike,
+    confidence: ArrayLike,
+    gradient: ArrayLike,
+    image: ArrayLike,
+    parameters: MRFParameters = MRFParameters(),  # noqa: B008 - frozen
+    form: Form = "exact",
+    solver: SolverName = "auto",
+    tolerance: float = DEFAULT_TOLERANCE,
+) -> NDArray[np.float32]:
+    """Refine a disparity map so that it keeps what is confident and follows the predicted gradients
+    elsewhere.
+
+    Args:
+        disparity: (H, W) initial disparity in pixels. NaN is a pixel without one, whatever its confidence.
+        confidence: (H, W) in [0, 1].
+        gradient: (H, W, 2) forward differences [dx, dy] of the disparity to be expected, pixels a pixel. NaN
+            leaves that difference free; the last column of dx and the last row of dy are not used.
+        image: (H, W, 3) uint8, the view the disparity belongs to.
+        parameters: The energy's weights.
+        form: "exact" minimises the energy; "paper" solves the paper's Eq. 8 as printed (see `refine.system`).
+        solver: "direct", "cg", "multigrid", or "auto": direct for small images, multigrid for others.
+        tolerance: Relative residual |b - A x| / |b| at which "cg" and "multigrid" stop.
+
+    Returns:
+        (H, W) float32 refined disparity, finite everywhere.
+
+    Raises:
+        ValueError: If a shape, type or range is wrong, or no pixel has a disparity.
+        refine.solvers.SolverError: If the system is singular: with `beta` 0 or no confidence, a region that
+        is cut
+            off by image edges and has no disparity of its own.
+    """
+    return solve_mrf(
+        disparity, confidence, gradient, image, parameters, form, solver, tolerance
+    ).disparity.astype(np.float32)
+
+
+def solve_mrf(
+    disparity: ArrayLike,
+    confidence: ArrayLike,
+    gradient: ArrayLike,
+    image: ArrayLike,
+    parameters: MRFParameters = MRFParameters(),  # noqa: B008 - frozen
+    form: Form = "exact",
+    solver: SolverName = "auto",
+    tolerance: float = DEFAULT_TOLERANCE,
+) -> MRFSolution:
+    """`refine_disparity` with the result in float64 and an account of how it was reached."""
+    began = time.perf_counter()
+    inputs = _checked(disparity, confidence, gradient, image)
+    if form not in ("exact", "paper"):
+        raise ValueError(f"the MRF's form is 'exact' or 'paper', not {form!r}")
+    if solver not in ("auto", *_SOLVERS):
+        raise ValueError(f"the MRF's solver is one of 'auto', 'multigrid', 'cg', 'direct', not {solver!r}")
+    if not 0 < tolerance < 1:
+        raise ValueError(f"the solver's tolerance must be between 0 and 1, got {tolerance}")
+    system = build_system(*inputs, parameters, form)
+    start = _filled(inputs[0]).ravel()
+    name = solver
+    if solver == "auto":
+        name = "direct" if start.size <= _DIRECT_UP_TO_PIXELS else "multigrid"
+    solution, used = _solve(system, start, name, tolerance)
+    info = SolveInfo(
+        solver=used,
+        iterations=solution.iterations,
+        relative_residual=system.relative_residual(solution.x),
+        seconds=time.perf_counter() - began,
+        fell_back=used != name,
+    )
+    return MRFSolution(solution.x.reshape(system.shape), info)
+
+
+def _solve(system: MRFSystem, start: Floats, name: str, tolerance: float) -> tuple[LinearSolution, str]:
+    """Solve by the named solver, or by the direct one where that does not converge; also the solver used."""
+    solution = _SOLVERS[name](system, start, tolerance)
+    if solution.converged:
+        return solution, name
+    warnings.warn(
+        f"the {name} solver stopped at a relative residual of {system.relative_residual(solution.x):.1e}, "
+        f"short of {tolerance:.1e}, after {solution.iterations} iterations; solving directly instead",
+        ConvergenceWarning,
+        stacklevel=4,
+    )
+    return solve_direct(system, start, tolerance), "direct"
+
+
+def _checked(
+    disparity: ArrayLike, confidence: ArrayLike, gradient: ArrayLike, image: ArrayLike
+) -> tuple[Floats, Floats, Floats, NDArray[np.uint8]]:
+    """The inputs as float64 (image: uint8) arrays, or a ValueError that says which is wrong and how."""
+    depths = np.asarray(disparity, dtype=np.float64)
+    if depths.ndim != 2 or depths.size == 0:
+        raise ValueError(f"disparity must be (H, W) with at least one pixel, got shape {depths.shape}")
+    if np.isinf(depths).any():
+        raise ValueError("disparity holds infinities; mark missing values by NaN")
+    if np.isnan(depths).all():
+        raise ValueError(
+            f"none of the {depths.shape[1]}x{depths.shape[0]} pixels has a disparity: all are NaN"
+        )
+    shape = depths.shape
+    trust = np.asarray(confidence, dtype=np.float64)
+    if trust.shape != shape:
+        raise ValueError(f"confidence has shape {trust.shape}, the disparity {shape}")
+    if not ((trust >= 0) & (trust <= 1)).all():
+        raise ValueError(
+            f"confidence must be in [0, 1] at every pixel, got {np.min(trust)} to {np.max(trust)}"
+            f" with {int(np.isnan(trust).sum())} NaN"
+        )
+    slopes = np.asarray(gradient, dtype=np.float64)
+    if slopes.shape != (*shape, 2):
+        raise ValueError(f"gradient has shape {slopes.shape}, expected {(*shape, 2)} for this disparity")
+    if np.isinf(slopes).any():
+        raise ValueError("gradient holds infinities; mark missing values by NaN")
+    colors = np.asarray(image)
+    if colors.dtype != np.uint8 or colors.shape != (*shape, 3):
+        raise ValueError(
+            f"the image must be uint8 of shape {(*shape, 3)} as the disparity; it is {colors.dtype} {colors.shape}"
+        )
+    return depths, trust, slopes, colors
+
+
+def _filled(disparity: Floats) -> Floats:
+    """The disparity with every NaN replaced by the nearest known value: where the iterative solvers start."""
+    unknown = np.isnan(disparity)
+    if not unknown.any():
+        return disparity
+    nearest = distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    filled: Floats = disparity[tuple(nearest)]
+    return filled
