@@ -12,8 +12,8 @@ import numpy as np
 from datagen.formats import write_camera_data, write_gradient, write_occlusion, write_pfm, write_png
 from datagen.formats.atomic import write_text
 from datagen.frames import BLENDER_LOG, EyeTargets, RenderOptions, Stopwatch, render_frames
-from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, Eye
-from datagen.layout import EYES, FIRST_FRAME, Layout
+from datagen.ground_truth import EYES, OCCLUDED, OUT_OF_FRAME, Eye
+from datagen.layout import FIRST_FRAME, Layout
 from datagen.manifest import SceneManifest, file_entry, write_manifest
 from datagen.recipe import Recipe
 from scenes import Scene, scene_to_json

@@ -1,0 +1,1 @@
+"""The command line, and the pipelines that join scenes, datagen, training and refine."""

@@ -1,0 +1,62 @@
+"""Entry point: parse, run one command, and turn every expected failure into one clear sentence."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+import tyro
+
+from stereoforge.commands import COMMANDS
+from stereoforge.errors import CommandFailed, UsageError
+
+DEBUG_FLAG = "--debug"
+MISSING_PARTS = {
+    "bpy": "rendering needs Blender: pip install 'stereoforge[render]' on Python 3.11 (bpy 4.5) or 3.13 (bpy 5.2)",
+    "torch": "networks need PyTorch: pip install torch, then pip install 'stereoforge[train]'",
+    "pytorch_lightning": "training needs Lightning: pip install 'stereoforge[train]'",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line; always ends in SystemExit: 0 success, 1 failure, 2 wrong usage, 130 interrupted."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = DEBUG_FLAG in words
+    command = tyro.extras.subcommand_cli_from_dict(
+        COMMANDS,
+        prog="stereoforge",
+        description="Make stereo training sets in Blender, train stereo networks on them, refine disparity.",
+        args=[word for word in words if word != DEBUG_FLAG],
+        config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagConversionOff, tyro.conf.HelptextFromCommentsOff),
+    )
+    try:
+        command.run()
+    except KeyboardInterrupt:
+        sys.exit(_say("interrupted; the same command run again continues where it can", 130))
+    except Exception as error:
+        if debug:
+            raise
+        sys.exit(_say(*_explain(error)))
+    sys.exit(0)
+
+
+def _explain(error: Exception) -> tuple[str, int]:
+    """One sentence and an exit code for anything a command raised."""
+    if isinstance(error, UsageError):
+        return str(error), 2
+    if isinstance(error, ModuleNotFoundError) and error.name in MISSING_PARTS:
+        return MISSING_PARTS[error.name], 1
+    if isinstance(error, OSError):
+        return f"{error.strerror or error}: {error.filename}" if error.filename else str(error), 1
+    if isinstance(error, CommandFailed | ValueError) or _is_our_own(error):
+        return str(error), 1
+    return f"unexpected {type(error).__name__}: {error} (run again with {DEBUG_FLAG} to see where)", 1
+
+
+def _is_our_own(error: Exception) -> bool:
+    return type(error).__module__.split(".")[0] in {"scenes", "datagen", "training", "refine", "stereoforge"}
+
+
+def _say(sentence: str, code: int) -> int:
+    print(f"stereoforge: {' '.join(sentence.split())}", file=sys.stderr)
+    return code
