@@ -14,11 +14,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from datagen.errors import DatasetError
 
 SPLITS = ("train", "val", "test")
-EYES = ("left", "right")
+Eye = Literal["left", "right"]
+EYES: tuple[Eye, Eye] = ("left", "right")
+
 FIRST_FRAME = 6
 LETTER = "A"
 """FlyingThings3D groups its scenes in A, B and C; all of ours are in the first group."""
@@ -73,7 +76,7 @@ class Layout:
             return folder / f"{entry.folder}{entry.extension}"
         if eye not in EYES or frame is None or frame < FIRST_FRAME:
             raise ValueError(
-                f"a file of {kind} needs an eye of {EYES} and a frame from {FIRST_FRAME} up, "
+                f"a file of {kind} needs an eye, left or right, and a frame from {FIRST_FRAME} up, "
                 f"got {eye!r} and {frame}"
             )
         return folder / eye / f"{_number(frame)}{entry.extension}"

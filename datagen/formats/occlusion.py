@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from datagen.errors import FormatError
 from datagen.formats.png import read_png, write_png
 
-VISIBLE, OCCLUDED, OUT_OF_FRAME = 0, 1, 2
 _NO_LABEL = 3
 _GREYS = np.array([0, 255, 128], np.uint8)
 _LABELS = np.full(256, _NO_LABEL, np.uint8)
-_LABELS[_GREYS] = [VISIBLE, OCCLUDED, OUT_OF_FRAME]
+_LABELS[_GREYS] = [0, 1, 2]
 
 
 def read_occlusion(path: Path | str) -> NDArray[np.uint8]:

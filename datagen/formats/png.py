@@ -35,6 +35,21 @@ def read_png(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
     return image  # type: ignore[no-any-return]
 
 
+def read_png_size(path: Path | str) -> tuple[int, int]:
+    """(height, width) from a PNG's header alone. Raises FormatError."""
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(_SIGNATURE) + 16)
+    except OSError as error:
+        raise FormatError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(start) < len(_SIGNATURE) + 16 or not start.startswith(_SIGNATURE + b"\0\0\0\rIHDR"):
+        raise FormatError(f"{path}: is not a PNG file, it does not begin with an image header")
+    width, height = struct.unpack_from(">II", start, len(_SIGNATURE) + 8)
+    check_image_size(path, width, height, channels=4)
+    return height, width
+
+
 def write_png(path: Path | str, array: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
     """Write (H, W) grey or (H, W, 3) RGB values of type uint8 or uint16."""
     path = Path(path)

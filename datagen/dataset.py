@@ -1,0 +1,273 @@
+"""Reading a data set: a sequence of stereo samples whose arrays are read when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.errors import DatasetError
+from datagen.formats import read_gradient, read_occlusion, read_pfm, read_png
+from datagen.formats.png import read_png_size
+from datagen.layout import EYES, RENDER_PASSES, SPLITS, Eye, Layout
+from datagen.manifest import read_manifest
+from scenes import Scene, scene_from_json
+
+
+@dataclass(frozen=True)
+class EyeView:
+    """What one eye of a sample sees; shapes and meanings are those of `StereoSample`."""
+
+    image: NDArray[np.uint8]
+    disparity: NDArray[np.float32]
+    gradient: NDArray[np.float32]
+    gradient_valid: NDArray[np.bool_]
+    occlusion: NDArray[np.uint8]
+    object_index: NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class StereoSample:
+    """One frame of a scene. Every array is read at its first use and kept as long as the sample is.
+
+    Reading raises DatasetError, naming the file, for one that is missing, damaged, or not of the size of
+    the left image.
+    """
+
+    layout: Layout
+    split: str
+    scene: int
+    frame: int
+    """The frame's number on disk."""
+    render_pass: str = "clean"
+
+    @property
+    def name(self) -> str:
+        """Split, scene and frame, for example `TEST/A/0003/0006`."""
+        left = self._file("disparity", "left")
+        scene = self.layout.scene_folder("disparity", self.split, self.scene)
+        return f"{self.layout.relative(scene).partition('/')[2]}/{left.stem}"
+
+    @cached_property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels, from the header of the left image."""
+        return read_png_size(self._file(self._image_kind, "left"))
+
+    @cached_property
+    def left(self) -> NDArray[np.uint8]:
+        """(H, W, 3) sRGB."""
+        return self._image("left")
+
+    @cached_property
+    def right(self) -> NDArray[np.uint8]:
+        """(H, W, 3) sRGB."""
+        return self._image("right")
+
+    @cached_property
+    def disparity_left(self) -> NDArray[np.float32]:
+        """(H, W) pixels, x_right = x_left - d; NaN invalid, 0 infinitely far."""
+        return self._disparity("left")
+
+    @cached_property
+    def disparity_right(self) -> NDArray[np.float32]:
+        """(H, W) pixels, x_left = x_right + d; NaN invalid, 0 infinitely far."""
+        return self._disparity("right")
+
+    @property
+    def gradient_left(self) -> NDArray[np.float32]:
+        """(H, W, 2) forward differences of the disparity, [dx, dy]."""
+        return self._gradient_left[0]
+
+    @property
+    def gradient_right(self) -> NDArray[np.float32]:
+        """(H, W, 2) forward differences of the disparity, [dx, dy]."""
+        return self._gradient_right[0]
+
+    @property
+    def gradient_valid_left(self) -> NDArray[np.bool_]:
+        """(H, W) where the gradient exists and is no discontinuity."""
+        return self._gradient_left[1]
+
+    @property
+    def gradient_valid_right(self) -> NDArray[np.bool_]:
+        """(H, W) where the gradient exists and is no discontinuity."""
+        return self._gradient_right[1]
+
+    @cached_property
+    def occlusion_left(self) -> NDArray[np.uint8]:
+        """(H, W) 0 visible in the right image, 1 occluded, 2 out of its frame."""
+        return self._occlusion("left")
+
+    @cached_property
+    def occlusion_right(self) -> NDArray[np.uint8]:
+        """(H, W) 0 visible in the left image, 1 occluded, 2 out of its frame."""
+        return self._occlusion("right")
+
+    @cached_property
+    def object_index_left(self) -> NDArray[np.uint16]:
+        """(H, W) 0 sky, else 1 + index in the scene's objects."""
+        return self._object_index("left")
+
+    @cached_property
+    def object_index_right(self) -> NDArray[np.uint16]:
+        """(H, W) 0 sky, else 1 + index in the scene's objects."""
+        return self._object_index("right")
+
+    def view(self, eye: Eye) -> EyeView:
+        """Everything of the "left" or "right" eye."""
+        if eye not in EYES:
+            raise ValueError(f"an eye is 'left' or 'right', not {eye!r}")
+        return EyeView(
+            image=getattr(self, eye),
+            disparity=getattr(self, f"disparity_{eye}"),
+            gradient=getattr(self, f"gradient_{eye}"),
+            gradient_valid=getattr(self, f"gradient_valid_{eye}"),
+            occlusion=getattr(self, f"occlusion_{eye}"),
+            object_index=getattr(self, f"object_index_{eye}"),
+        )
+
+    @cached_property
+    def scene_record(self) -> Scene:
+        """The world that was rendered, with its camera."""
+        return read_scene(self.layout.scene_record(self.split, self.scene))
+
+    @cached_property
+    def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        return self._gradient("left")
+
+    @cached_property
+    def _gradient_right(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        return self._gradient("right")
+
+    @property
+    def _image_kind(self) -> str:
+        return RENDER_PASSES[self.render_pass]
+
+    def _file(self, kind: str, eye: Eye) -> Path:
+        return self.layout.file(kind, self.split, self.scene, eye, self.frame)
+
+    def _image(self, eye: Eye) -> NDArray[np.uint8]:
+        path = self._file(self._image_kind, eye)
+        image = read_png(path)
+        self._check(path, image, (*self.size, 3), np.uint8)
+        return image  # type: ignore[return-value]
+
+    def _disparity(self, eye: Eye) -> NDArray[np.float32]:
+        path = self._file("disparity", eye)
+        disparity = read_pfm(path)
+        self._check(path, disparity, self.size, np.float32)
+        return disparity
+
+    def _gradient(self, eye: Eye) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        path = self._file("disparity_gradient", eye)
+        gradient, valid = read_gradient(path)
+        self._check(path, gradient, (*self.size, 2), np.float32)
+        return gradient, valid
+
+    def _occlusion(self, eye: Eye) -> NDArray[np.uint8]:
+        path = self._file("occlusion", eye)
+        labels = read_occlusion(path)
+        self._check(path, labels, self.size, np.uint8)
+        return labels
+
+    def _object_index(self, eye: Eye) -> NDArray[np.uint16]:
+        path = self._file("object_index", eye)
+        index = read_png(path)
+        self._check(path, index, self.size, np.uint16)
+        return index  # type: ignore[return-value]
+
+    def _check(self, path: Path, array: NDArray[Any], shape: tuple[int, ...], dtype: type) -> None:
+        if array.shape != shape or array.dtype != dtype:
+            raise DatasetError(
+                f"{path}: holds {array.shape} of {array.dtype} where the left image's size asks for "
+                f"{shape} of {np.dtype(dtype)}"
+            )
+
+
+class StereoDataset(Sequence[StereoSample]):
+    """The frames of all finished scenes of one split, in order; a scene without its manifest is not there."""
+
+    def __init__(self, root: Path | str, split: str, render_pass: str = "clean") -> None:
+        """Find the frames; no array is read yet.
+
+        Args:
+            root: The data set's folder.
+            split: "train", "val" or "test".
+            render_pass: Which images to read, "clean" or "final".
+
+        Raises:
+            DatasetError: For a folder that is missing or no data set, a split without a finished scene, a
+                damaged manifest, or a pass that was not rendered.
+        """
+        if render_pass not in RENDER_PASSES:
+            raise DatasetError(
+                f"there is no render pass {render_pass!r}; there are {', '.join(RENDER_PASSES)}"
+            )
+        layout = open_layout(root)
+        scenes = layout.committed_scenes(split)
+        if not scenes:
+            raise DatasetError(f"{layout.root}: has no finished {split} scene{_splits_present(layout)}")
+        self.layout, self.split, self.render_pass = layout, split, render_pass
+        self._frames = [(scene, frame) for scene in scenes for frame in self._frames_of(scene)]
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    @overload
+    def __getitem__(self, index: int) -> StereoSample: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[StereoSample]: ...
+
+    def __getitem__(self, index: int | slice) -> StereoSample | list[StereoSample]:
+        if isinstance(index, slice):
+            return [self._sample(*frame) for frame in self._frames[index]]
+        return self._sample(*self._frames[index])
+
+    def __repr__(self) -> str:
+        return f"StereoDataset({str(self.layout.root)!r}, {self.split!r}): {len(self)} frames"
+
+    def _sample(self, scene: int, frame: int) -> StereoSample:
+        return StereoSample(self.layout, self.split, scene, frame, self.render_pass)
+
+    def _frames_of(self, scene: int) -> list[int]:
+        """The numbers of a scene's frames, as its manifest lists their left images."""
+        manifest = self.layout.manifest(self.split, scene)
+        folder = self.layout.scene_folder(RENDER_PASSES[self.render_pass], self.split, scene) / "left"
+        prefix = f"{self.layout.relative(folder)}/"
+        names = (entry.path for entry in read_manifest(manifest).files)
+        frames = sorted(int(Path(name).stem) for name in names if name.startswith(prefix))
+        if not frames:
+            raise DatasetError(f"{manifest}: lists no image of the {self.render_pass} pass")
+        return frames
+
+
+def open_layout(root: Path | str) -> Layout:
+    """The layout of an existing data set. Raises DatasetError for a folder that is missing or is none."""
+    layout = Layout(Path(root))
+    if not layout.root.is_dir():
+        raise DatasetError(f"{layout.root}: there is no such folder")
+    if not layout.recipe.is_file():
+        raise DatasetError(f"{layout.root}: is not a data set, it has no {layout.recipe.name}")
+    return layout
+
+
+def read_scene(path: Path) -> Scene:
+    """Read a Scene record. Raises DatasetError for a file that is missing or does not describe a scene."""
+    try:
+        return scene_from_json(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise DatasetError(f"{path}: is not a scene ({error})") from error
+
+
+def _splits_present(layout: Layout) -> str:
+    counts = {split: len(layout.committed_scenes(split)) for split in SPLITS}
+    present = " and ".join(f"{count} {split}" for split, count in counts.items() if count)
+    return f"; there are {present}" if present else " and none of another split"
