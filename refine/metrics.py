@@ -88,6 +88,13 @@ class ErrorPool:
         self.total_error += float(known.sum())
         return self
 
+    def merge(self, other: ErrorPool) -> None:
+        """Take in what another pool has summed."""
+        self.pixels += other.pixels
+        self.missing += other.missing
+        self.bad += other.bad
+        self.total_error += other.total_error
+
     @property
     def bad_pixel_rate(self) -> float:
         return self.bad / self.pixels if self.pixels else float("nan")
@@ -116,6 +123,11 @@ class GradientPool:
         self.counts = self.counts + counted.sum(axis=(0, 1))
         self.totals = self.totals + np.where(counted, error, 0).sum(axis=(0, 1))
         return self
+
+    def merge(self, other: GradientPool) -> None:
+        """Take in what another pool has summed."""
+        self.counts = self.counts + other.counts
+        self.totals = self.totals + other.totals
 
     @property
     def gradient_error(self) -> float:

@@ -19,8 +19,9 @@ from refine.weights import Floats
 
 SolverName = Literal["auto", "multigrid", "cg", "direct"]
 
-DEFAULT_TOLERANCE = 1e-5
-"""Relative residual at which the iterative solvers stop."""
+DEFAULT_TOLERANCE = 1e-6
+"""Relative residual at which the iterative solvers stop: keeps every pixel within about 0.01 of the exact
+solution (960x540; at 1e-5 single pixels are off by 0.1, while mean errors no longer change at 1e-3)."""
 
 _SOLVERS = {"multigrid": solve_multigrid, "cg": solve_cg, "direct": solve_direct}
 _DIRECT_UP_TO_PIXELS = 4096
@@ -170,9 +171,8 @@ def _checked(
         raise ValueError("gradient holds infinities; mark missing values by NaN")
     colors = np.asarray(image)
     if colors.dtype != np.uint8 or colors.shape != (*shape, 3):
-        raise ValueError(
-            f"the image must be uint8 of shape {(*shape, 3)} as the disparity; it is {colors.dtype} {colors.shape}"
-        )
+        got = f"{colors.dtype} {colors.shape}"
+        raise ValueError(f"the image must be uint8 of shape {(*shape, 3)}, as the disparity; got {got}")
     return depths, trust, slopes, colors
 
 

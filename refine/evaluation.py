@@ -1,0 +1,294 @@
+"""Running methods over frames and adding up what they get wrong: the numbers of the paper's Tables 1-5, Figs
+4-6.
+
+Frames are read one at a time and dropped, but for the few whose pictures the report shows.
+"""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from refine.methods import EvaluationFrame, Method, MethodOutput, default_methods
+from refine.metrics import (
+    ErrorPool,
+    GradientPool,
+    SparsificationCurve,
+    bad_pixel_rate,
+    forward_gradient,
+    optimal_auc,
+    smooth_mask,
+    sparsification_curve,
+)
+
+__all__ = [
+    "Evaluation",
+    "EvaluationFrame",
+    "EvaluationOptions",
+    "FrameScore",
+    "MethodScore",
+    "Panel",
+    "RegionScore",
+    "evaluate",
+]
+
+REGIONS = ("all", "occ")
+"""All: every pixel with ground truth. Occ: those hidden from, or outside, the other view."""
+
+
+@dataclass(frozen=True)
+class EvaluationOptions:
+    """Thresholds of the measures, and how many frames to keep pictures of."""
+
+    bad_threshold: float = 1.0
+    """A disparity further off than this is bad, in pixels."""
+    gradient_threshold: float = 1.0
+    """Ground-truth forward differences above it are discontinuities, left out of the masked gradient
+    error."""
+    first_panels: int = 4
+    """Frames shown because they come first."""
+    worst_panels: int = 3
+    """Frames shown because `Evaluation.judged` has its largest end-point errors there."""
+
+
+@dataclass(frozen=True)
+class RegionScore:
+    """Disparity errors over one region of the pixels."""
+
+    bad: float
+    """Share of bad pixels, 0..1; NaN where the region has no pixels or the method no disparity."""
+    epe: float
+    """Mean |d - d*| in pixels."""
+    pixels: int
+
+
+@dataclass(frozen=True)
+class MethodScore:
+    """All measures of one method, over one frame or pooled over a set."""
+
+    regions: dict[str, RegionScore]
+    """By the names in `REGIONS`."""
+    gradient_masked: float
+    """Gradient error where the ground truth is smooth (the paper's Tables 1, 4, 5)."""
+    gradient_all: float
+    """Gradient error over every pixel, discontinuities included."""
+    seconds: float
+    """Mean wall-clock time a frame."""
+
+
+@dataclass(frozen=True)
+class FrameScore:
+    """Everything measured on one frame."""
+
+    name: str
+    methods: dict[str, MethodScore]
+    """By method name; without the methods that could not run."""
+    initial_bad: float
+    """Bad rate of the initial disparity: the area under the curve of a random order."""
+    optimal_auc: float
+    curves: dict[str, SparsificationCurve]
+    """Sparsification of the initial disparity by each confidence measure: "confnet" and the frame's
+    others."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One frame kept whole, with every method's result, to be looked at."""
+
+    frame: EvaluationFrame
+    disparities: dict[str, NDArray[np.float32]]
+    """By method name, for the methods that give a disparity."""
+    order: int
+    """Place of the frame in the set, from 0."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What came out of `evaluate`."""
+
+    options: EvaluationOptions
+    labels: dict[str, str]
+    """Method name to its name for readers, in the order of the tables."""
+    scores: dict[str, MethodScore]
+    """Pooled over all pixels of all frames on which the method ran."""
+    skipped: dict[str, str]
+    """Methods that could not run, and the inputs they lacked."""
+    frames: tuple[FrameScore, ...]
+    first: tuple[Panel, ...]
+    worst: tuple[Panel, ...]
+    """Worst first."""
+    judged: str
+    """The method by which frames are called worst: "ours", or the first one where that did not run."""
+
+
+def evaluate(
+    frames: Iterable[EvaluationFrame],
+    methods: Sequence[Method] = (),
+    options: EvaluationOptions = EvaluationOptions(),
+    progress: Callable[[int, str], None] | None = None,
+) -> Evaluation:
+    """Run every method on every frame and measure the results.
+
+    Args:
+        frames: Read once, one at a time.
+        methods: Rows of the tables, in order; `default_methods()` if empty. A method whose inputs the first
+            frame lacks is skipped and listed.
+        options: Thresholds and numbers of pictures.
+        progress: Called after each frame with the number of frames done and the frame's name.
+
+    Raises:
+        ValueError: If there is no frame, no method can run, two methods share a name, or a later frame lacks
+        an
+            input that the first one had.
+    """
+    run = _Run(tuple(methods) or default_methods(), options)
+    for frame in frames:
+        run.take(frame)
+        if progress is not None:
+            progress(len(run.scores), frame.name)
+    return run.finish()
+
+
+class _Run:
+    """An evaluation under way."""
+
+    def __init__(self, methods: tuple[Method, ...], options: EvaluationOptions) -> None:
+        names = [method.name for method in methods]
+        if len(set(names)) != len(names):
+            raise ValueError(f"every method may be evaluated once, got {', '.join(names)}")
+        self.methods = methods
+        self.options = options
+        self.skipped: dict[str, str] = {}
+        self.pools: dict[str, _Pool] = {}
+        self.scores: list[FrameScore] = []
+        self.first: list[Panel] = []
+        self.worst: list[tuple[float, int, Panel]] = []
+
+    def take(self, frame: EvaluationFrame) -> None:
+        """Evaluate one frame."""
+        if not self.scores:
+            self._choose_methods(frame)
+        scores, disparities = {}, {}
+        for method in self.methods:
+            if method.missing(frame):
+                lacking = " and no ".join(method.missing(frame))
+                raise ValueError(f"frame {frame.name} has no {lacking}; the first frame has")
+            began = time.perf_counter()
+            output = method.run(frame)
+            pool = _Pool(self.options)
+            pool.add(frame, output, time.perf_counter() - began)
+            self.pools[method.name].merge(pool)
+            scores[method.name] = pool.score()
+            if output.disparity is not None:
+                disparities[method.name] = output.disparity
+        self._keep(Panel(frame, disparities, order=len(self.scores)), scores[self.judged].regions["all"].epe)
+        self.scores.append(self._frame_score(frame, scores))
+
+    def finish(self) -> Evaluation:
+        """Pool the frames taken."""
+        if not self.scores:
+            raise ValueError("there is no frame to evaluate")
+        return Evaluation(
+            options=self.options,
+            labels={method.name: method.label for method in self.methods},
+            scores={name: pool.score() for name, pool in self.pools.items()},
+            skipped=self.skipped,
+            frames=tuple(self.scores),
+            first=tuple(self.first),
+            worst=tuple(panel for _, _, panel in sorted(self.worst, key=lambda entry: -entry[0])),
+            judged=self.judged,
+        )
+
+    def _choose_methods(self, frame: EvaluationFrame) -> None:
+        self.skipped = {
+            method.name: f"{method.label} needs {' and '.join(method.missing(frame))}, which the frames lack"
+            for method in self.methods
+            if method.missing(frame)
+        }
+        self.methods = tuple(method for method in self.methods if method.name not in self.skipped)
+        if not self.methods:
+            raise ValueError(f"no method can run: {'; '.join(self.skipped.values())}")
+        self.pools = {method.name: _Pool(self.options) for method in self.methods}
+        self.judged = "ours" if "ours" in self.pools else self.methods[0].name
+
+    def _keep(self, panel: Panel, error: float) -> None:
+        """Keep the frame's arrays if it is among the first or, so far, among the worst."""
+        if len(self.first) < self.options.first_panels:
+            self.first.append(panel)
+        if np.isfinite(error):
+            heapq.heappush(self.worst, (error, panel.order, panel))
+            if len(self.worst) > self.options.worst_panels:
+                heapq.heappop(self.worst)
+
+    def _frame_score(self, frame: EvaluationFrame, scores: dict[str, MethodScore]) -> FrameScore:
+        threshold = self.options.bad_threshold
+        measures = dict(frame.other_confidences)
+        if frame.confidence is not None:
+            measures = {"confnet": frame.confidence, **measures}
+        curves = {
+            name: sparsification_curve(frame.disparity, frame.truth, values, threshold)
+            for name, values in measures.items()
+        }
+        bad = bad_pixel_rate(frame.disparity, frame.truth, threshold)
+        return FrameScore(
+            name=frame.name,
+            methods=scores,
+            initial_bad=bad,
+            optimal_auc=optimal_auc(bad) if np.isfinite(bad) else float("nan"),
+            curves=curves,
+        )
+
+
+@dataclass
+class _Pool:
+    """Running sums of one method."""
+
+    options: EvaluationOptions
+    regions: dict[str, ErrorPool] = field(default_factory=dict)
+    masked: GradientPool = field(default_factory=GradientPool)
+    everywhere: GradientPool = field(default_factory=GradientPool)
+    seconds: float = 0.0
+    frames: int = 0
+
+    def __post_init__(self) -> None:
+        self.regions = {name: ErrorPool(self.options.bad_threshold) for name in REGIONS}
+
+    def add(self, frame: EvaluationFrame, output: MethodOutput, seconds: float) -> None:
+        if output.disparity is not None:
+            self.regions["all"].add(output.disparity, frame.truth)
+            self.regions["occ"].add(output.disparity, frame.truth, frame.occlusion > 0)
+        if output.gradient is not None:
+            gradient = np.asarray(output.gradient, dtype=np.float64)
+        elif output.disparity is not None:
+            gradient = forward_gradient(output.disparity)
+        else:
+            raise ValueError("a method gave neither a disparity nor a gradient")
+        truth = forward_gradient(frame.truth)
+        self.masked.add(gradient, truth, smooth_mask(truth, self.options.gradient_threshold))
+        self.everywhere.add(gradient, truth)
+        self.seconds += seconds
+        self.frames += 1
+
+    def merge(self, other: _Pool) -> None:
+        for name, pool in other.regions.items():
+            self.regions[name].merge(pool)
+        self.masked.merge(other.masked)
+        self.everywhere.merge(other.everywhere)
+        self.seconds += other.seconds
+        self.frames += other.frames
+
+    def score(self) -> MethodScore:
+        return MethodScore(
+            regions={
+                name: RegionScore(pool.bad_pixel_rate, pool.end_point_error, pool.pixels)
+                for name, pool in self.regions.items()
+            },
+            gradient_masked=self.masked.gradient_error,
+            gradient_all=self.everywhere.gradient_error,
+            seconds=self.seconds / max(self.frames, 1),
+        )

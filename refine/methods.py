@@ -1,0 +1,118 @@
+"""What an evaluation compares: frames in, disparities (or gradients) out, one class a row of the tables.
+
+A new method is one module in `refine/baselines/` with a `Method` subclass; it is found by itself.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class EvaluationFrame:
+    """One view with its ground truth and what the networks predicted for it."""
+
+    name: str
+    image: NDArray[np.uint8]
+    """(H, W, 3)."""
+    truth: NDArray[np.float32]
+    """(H, W) disparity in pixels, NaN where unknown."""
+    occlusion: NDArray[np.uint8]
+    """(H, W): 0 visible, 1 occluded in the other view, 2 out of the other frame."""
+    disparity: NDArray[np.float32]
+    """(H, W) initial disparity, NaN where there is none."""
+    confidence: NDArray[np.float32] | None = None
+    """(H, W) in [0, 1], probability that the initial disparity is right."""
+    gradient: NDArray[np.float32] | None = None
+    """(H, W, 2) as [dx, dy], the predicted disparity gradient."""
+    other_confidences: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    """Further confidence measures to compare, by name: (H, W), higher is surer, any scale."""
+
+    def __post_init__(self) -> None:
+        size = self.truth.shape
+        shapes: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
+            "image": (self.image.shape, (*size, 3)),
+            "occlusion": (self.occlusion.shape, size),
+            "disparity": (self.disparity.shape, size),
+        }
+        if self.confidence is not None:
+            shapes["confidence"] = (self.confidence.shape, size)
+        if self.gradient is not None:
+            shapes["gradient"] = (self.gradient.shape, (*size, 2))
+        for name, values in self.other_confidences.items():
+            shapes[f"confidence {name!r}"] = (values.shape, size)
+        for name, (got, expected) in shapes.items():
+            if got != expected:
+                raise ValueError(f"frame {self.name}: {name} has shape {got}, expected {expected}")
+
+
+@dataclass(frozen=True)
+class MethodOutput:
+    """What a method makes of a frame: a disparity, a gradient, or both."""
+
+    disparity: NDArray[np.float32] | None = None
+    """(H, W) pixels; None for a method that predicts gradients only."""
+    gradient: NDArray[np.float32] | None = None
+    """(H, W, 2) [dx, dy]; None where the disparity's own forward differences are to be measured."""
+
+
+@dataclass(frozen=True)
+class Method(ABC):
+    """One row of the tables; a subclass's fields are the method's parameters."""
+
+    name: ClassVar[str]
+    """Short name in files and on the command line (METHOD names of the paper's tables)."""
+    label: ClassVar[str]
+    """Name for readers of the report."""
+    upper_bound: ClassVar[bool] = False
+    """Whether it looks at the ground truth: no rival, but the room that is left."""
+    needs: ClassVar[frozenset[str]] = frozenset()
+    """Optional fields of `EvaluationFrame` the method cannot do without."""
+
+    @abstractmethod
+    def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Process one frame; only an upper bound may look at its ground truth."""
+
+    def missing(self, frame: EvaluationFrame) -> tuple[str, ...]:
+        """Which of the fields it needs this frame does not have."""
+        return tuple(sorted(name for name in self.needs if getattr(frame, name) is None))
+
+
+@cache
+def known_methods() -> Mapping[str, type[Method]]:
+    """Every method there is, by name: the `Method` subclasses of the modules in `refine/baselines/`."""
+    package = importlib.import_module("refine.baselines")
+    methods: dict[str, type[Method]] = {}
+    for found in pkgutil.iter_modules(package.__path__, "refine.baselines."):
+        module = importlib.import_module(found.name)
+        for _, member in inspect.getmembers(module, inspect.isclass):
+            if issubclass(member, Method) and member.__module__ == found.name:
+                if member.name in methods:
+                    other = methods[member.name].__module__
+                    raise ValueError(f"{found.name} and {other} both define a method {member.name!r}")
+                methods[member.name] = member
+    return methods
+
+
+def default_methods(names: tuple[str, ...] = ()) -> tuple[Method, ...]:
+    """Methods with their default parameters: those named, in that order, or the paper's main rows.
+
+    Raises:
+        ValueError: If a name is not known.
+    """
+    known = known_methods()
+    chosen = names or ("regressor", "gradnet", "ours", "ours_conf_gt")
+    for name in chosen:
+        if name not in known:
+            raise ValueError(f"there is no method {name!r}; known are {', '.join(sorted(known))}")
+    return tuple(known[name]() for name in chosen)
