@@ -1,0 +1,52 @@
+# make demo    everything at small scale, from nothing to a report      make test    the whole test suite
+# make install only the environment                                     make check   lint, types, import rules
+#
+# All of them set up .venv first, from pinned versions. A machine with a GPU can bring its own torch:
+# make install PIP_FLAGS="--index-url ..." CONSTRAINTS=/dev/null
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+CONSTRAINTS ?= constraints.txt
+PIP_FLAGS ?=
+DEMO ?= demo
+BIN := .venv/bin
+# What Blender's library wants from the system, where it is not there already (Debian's names).
+BLENDER_LIBRARIES := libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libxext6 libsm6 libice6 libgl1
+
+.PHONY: install demo test check clean
+
+install: .venv/.installed
+
+demo: .venv/.installed
+	$(BIN)/stereoforge demo --out $(DEMO)
+
+test: .venv/.installed-dev
+	$(BIN)/python -m pytest $(PYTEST_FLAGS)
+
+check: .venv/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+.venv/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
+	  { echo "StereoForge's pinned environment needs Python 3.11; say where with make PYTHON=/path/to/python3.11"; exit 1; }
+	$(PYTHON) -m venv .venv || { echo "python3 cannot make environments here: apt-get install python3-venv"; exit 1; }
+
+.venv/.installed: .venv/bin/python pyproject.toml $(CONSTRAINTS)
+	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable '.[all]'
+	@$(BIN)/python -c 'import bpy' >/dev/null 2>&1 || $(MAKE) --no-print-directory blender-libraries
+	@touch $@
+
+.venv/.installed-dev: .venv/.installed
+	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable '.[all,dev]'
+	@touch $@
+
+.PHONY: blender-libraries
+blender-libraries:
+	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  apt-get update -qq && apt-get install -y -qq $(BLENDER_LIBRARIES) >/dev/null; fi
+	@$(BIN)/python -c 'import bpy' || { echo "Blender needs system libraries: apt-get install $(BLENDER_LIBRARIES)"; exit 1; }
+
+clean:
+	rm -rf .venv build *.egg-info
