@@ -73,7 +73,7 @@ class Stopwatch:
             self.seconds[name] = round(self.seconds.get(name, 0.0) + time.perf_counter() - start, 4)
 
 
-class BlenderFailure(RuntimeError):
+class BlenderError(RuntimeError):
     """Blender could not render a scene; the message carries the end of its log."""
 
 
@@ -83,7 +83,7 @@ def render_frames(
     """Yield (frame, both eyes' arrays) for every frame of a scene, frames counted from 0.
 
     scratch: an existing folder for Blender's temporary files and its log. Blender keeps one world a process,
-    so one iterator at a time. Raises BlenderFailure, and RuntimeError on a Python without bpy.
+    so one iterator at a time. Raises BlenderError, and RuntimeError on a Python without bpy.
     """
     # Imported here so that planning, verifying and training work on a Python without Blender.
     from datagen.blender.build import build_world, place
@@ -119,7 +119,7 @@ def render_frames(
             yield frame, targets
     except RuntimeError as error:
         tail = " | ".join(log.read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:])
-        raise BlenderFailure(f"{error}; Blender's last words: {tail}") from error
+        raise BlenderError(f"{error}; Blender's last words: {tail}") from error
 
 
 def _targets(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from datagen.errors import DatasetError
-from datagen.executors import Executor, LocalExecutor, Outcome
+from datagen.executors import Executor, LocalExecutor
 from datagen.layout import Layout
 from datagen.manifest import SceneManifest
 from datagen.recipe import Recipe, merge_into, read_recipe, write_recipe
@@ -55,7 +55,7 @@ def render_dataset(
     jobs = [SceneJob(root, recipe, split, scene, device, threads) for split, scene in missing]
     executor = executor or LocalExecutor(workers=min(workers, max(1, len(jobs))))
     failures: list[tuple[str, str]] = []
-    with closing(_outcomes(executor, jobs)) as outcomes:
+    with closing(executor.run(render_scene, jobs)) as outcomes:
         for done, outcome in enumerate(outcomes, start=1):
             if outcome.error is not None:
                 failures.append((outcome.job.name, outcome.error))
@@ -64,10 +64,6 @@ def render_dataset(
     with suppress(OSError):  # another shard may still be using it
         (root / STAGING_FOLDER).rmdir()
     return RenderSummary(recipe, len(jobs) - len(failures), len(wanted) - len(jobs), tuple(failures))
-
-
-def _outcomes(executor: Executor, jobs: list[SceneJob]) -> Iterator[Outcome[SceneJob, SceneManifest]]:
-    return executor.run(render_scene, jobs) if jobs else iter(())
 
 
 def _claim(root: Path, recipe: Recipe) -> Recipe:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import tyro
 
 from stereoforge.commands import COMMANDS
-from stereoforge.errors import CommandFailed, UsageError
+from stereoforge.errors import CommandError, UsageError
 
 DEBUG_FLAG = "--debug"
 MISSING_PARTS = {
@@ -48,7 +48,7 @@ def _explain(error: Exception) -> tuple[str, int]:
         return MISSING_PARTS[error.name], 1
     if isinstance(error, OSError):
         return f"{error.strerror or error}: {error.filename}" if error.filename else str(error), 1
-    if isinstance(error, CommandFailed | ValueError) or _is_our_own(error):
+    if isinstance(error, CommandError | ValueError) or _is_our_own(error):
         return str(error), 1
     return f"unexpected {type(error).__name__}: {error} (run again with {DEBUG_FLAG} to see where)", 1
 

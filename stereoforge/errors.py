@@ -7,5 +7,5 @@ class UsageError(Exception):
     """The command was given values it cannot take: exit code 2."""
 
 
-class CommandFailed(Exception):
+class CommandError(Exception):
     """The command was right and did not succeed: exit code 1."""

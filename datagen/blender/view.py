@@ -53,7 +53,9 @@ def _read_view(path: Path) -> View:
     return View(
         radiance=np.stack([_channel(channels, f"Combined.{c}") for c in "RGB"], axis=-1),
         depth_m=np.where(depth >= BEYOND_EVERYTHING_M, np.float32(np.inf), depth),
-        object_index=np.rint(_channel(channels, "IndexOB.X", "Object Index.X", "IndexOB.V")).astype(np.uint16),
+        object_index=np.rint(_channel(channels, "IndexOB.X", "Object Index.X", "IndexOB.V")).astype(
+            np.uint16
+        ),
     )
 
 

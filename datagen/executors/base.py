@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -22,8 +22,6 @@ class Outcome(Generic[Job, Result]):
 class Executor(Protocol):
     """Runs jobs somewhere. Closing the iterator early stops the work and leaves no process behind."""
 
-    def run(
-        self, function: Callable[[Job], Result], jobs: Iterable[Job]
-    ) -> Iterator[Outcome[Job, Result]]:
+    def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Generator[Outcome[Job, Result], None, None]:
         """Call a picklable function on every job, yielding outcomes as they come, in any order."""
         ...

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -26,9 +26,7 @@ class LocalExecutor:
     jobs_per_worker: int = 40
     """A worker is replaced after so many jobs: Blender's memory grows slowly."""
 
-    def run(
-        self, function: Callable[[Job], Result], jobs: Iterable[Job]
-    ) -> Iterator[Outcome[Job, Result]]:
+    def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Generator[Outcome[Job, Result], None, None]:
         queue = iter(jobs)
         pool = ProcessPool(
             max_workers=self.workers,

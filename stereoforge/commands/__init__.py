@@ -1,6 +1,17 @@
 """One module a command: a frozen dataclass whose fields are its flags and whose `run` does the work."""
 
+from collections.abc import Callable
+from typing import Protocol
+
 from stereoforge.commands.render import Render
 
-COMMANDS = {"render": Render}
+
+class Command(Protocol):
+    """What the parser builds from the words after a command's name."""
+
+    def run(self) -> None:
+        """Do the work; whatever it raises becomes one sentence and an exit code."""
+
+
+COMMANDS: dict[str, Callable[..., Command]] = {"render": Render}
 """Every command by its name, in the order of use."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dataset
 from datagen.manifest import SceneManifest
 from scenes import FAMILIES
-from stereoforge.errors import CommandFailed, UsageError
+from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console, progress_bar
 from stereoforge.values import parse_shard, parse_size, shown
 
@@ -64,7 +64,7 @@ class Render:
         if summary.failures:
             for scene, reason in summary.failures:
                 console.print(f"  {scene}: {reason}", markup=False)
-            raise CommandFailed(f"{len(summary.failures)} scenes of {self.out} could not be rendered")
+            raise CommandError(f"{len(summary.failures)} scenes of {self.out} could not be rendered")
 
     def _render(self, recipe: Recipe) -> RenderSummary:
         with progress_bar() as progress:
@@ -92,7 +92,7 @@ class Render:
             world = replace(world, width=width, height=height)
         if self.frames_per_scene is not None:
             world = replace(world, frames=self.frames_per_scene)
-        changes: dict[str, object] = {"world": world}
+        changes: dict[str, Any] = {"world": world}
         if self.scenes is not None or self.split is not None:
             split = self.split or "train"
             changes["scenes"] = {split: DEFAULT_SCENES if self.scenes is None else self.scenes}

@@ -1,0 +1,152 @@
+"""Random worlds: disparity against the independent ray cast, pictures against disparity, labels against both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from datagen.frames import EyeTargets, RenderOptions, render_frames
+from datagen.ground_truth import EYES, OCCLUDED, VISIBLE, Eye, to_camera_frame
+from scenes import FAMILIES, Scene, sample_scene
+from tests.datagen.oracle import cast_depth
+
+SIZES = ((240, 136), (160, 90))
+SCENES_PER_SIZE = 5
+
+
+@dataclass(frozen=True)
+class World:
+    """One rendered scene with the triangles Blender saw."""
+
+    scene: Scene
+    targets: dict[Eye, EyeTargets]
+    triangles: NDArray[np.float64]
+
+    def cast_disparity(self, eye: Eye, shift_px: float = 0.0) -> NDArray[np.float64]:
+        camera = self.scene.camera
+        triangles = to_camera_frame(self.triangles, camera.pose(eye, 0.0))
+        depth = cast_depth(triangles, camera.width, camera.height, camera.focal_px, shift_px)
+        return camera.disparity_metres / depth
+
+
+@pytest.fixture(scope="module")
+def worlds(tmp_path_factory: pytest.TempPathFactory) -> list[World]:
+    """Ten random scenes; their triangles are Blender's own evaluated meshes."""
+    made = []
+    for width, height in SIZES:
+        for seed in range(SCENES_PER_SIZE):
+            config = FAMILIES["flying_things"].config(width=width, height=height)
+            scene = sample_scene(np.random.default_rng([seed, width]), "flying_things", config)
+            frames = render_frames(scene, tmp_path_factory.mktemp("blender"), RenderOptions(samples=16))
+            _, targets = next(frames)
+            from datagen.blender.geometry import evaluated_triangles
+
+            made.append(World(scene, targets, evaluated_triangles()))
+            frames.close()
+    return made
+
+
+def errors(worlds: list[World], eye: Eye, shift_px: float = 0.0) -> NDArray[np.float64]:
+    """|rendered - cast| of every pixel of every world, px."""
+    return np.concatenate(
+        [np.abs(w.targets[eye].disparity - w.cast_disparity(eye, shift_px)).ravel() for w in worlds]
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("eye", EYES)
+def test_disparity_equals_the_float64_ray_cast(worlds: list[World], eye: Eye) -> None:
+    error = errors(worlds, eye)
+    median, p999 = np.percentile(error, (50, 99.9))
+    off = float((error > 0.1).mean())
+    print(f"{eye}: {error.size} px, median {median:.1e} px, p99.9 {p999:.1e} px, off by > 0.1 px {off:.1e}")
+    assert median <= 1e-4
+    assert p999 <= 5e-3
+    assert off <= 1e-4
+
+
+@pytest.mark.slow
+def test_half_a_pixel_would_break_the_exactness_bars(worlds: list[World]) -> None:
+    error = errors(worlds, "left", shift_px=0.5)
+    assert np.percentile(error, 99.9) > 1.0
+    assert (error > 0.1).mean() > 1e-2
+
+
+@pytest.mark.slow
+def test_swapped_eyes_would_break_the_exactness_bars(worlds: list[World]) -> None:
+    error = np.concatenate(
+        [np.abs(w.targets["left"].disparity - w.cast_disparity("right")).ravel() for w in worlds]
+    )
+    assert np.percentile(error, 99.9) > 1.0
+
+
+def warp_error(world: World, shift_px: float = 0.0, sign: float = -1.0) -> NDArray[np.float64]:
+    """(H, W) squared error, in levels, of the left picture against the right one sampled at x - d."""
+    left, right = world.targets["left"], world.targets["right"]
+    rows, columns = np.mgrid[: left.disparity.shape[0], : left.disparity.shape[1]].astype(float)
+    where = [rows, columns + sign * left.disparity + shift_px]
+    warped = np.stack(
+        [
+            map_coordinates(right.image[..., c].astype(float), where, order=1, mode="nearest")
+            for c in range(3)
+        ],
+        -1,
+    )
+    return ((warped - left.image) ** 2).mean(axis=-1)
+
+
+def psnr(squared_errors: list[NDArray[np.float64]]) -> float:
+    return float(10 * np.log10(255**2 / np.concatenate(squared_errors).mean()))
+
+
+@pytest.mark.slow
+def test_warping_right_to_left_reproduces_it_where_visible(worlds: list[World]) -> None:
+    labels = [w.targets["left"].occlusion for w in worlds]
+    exact = [warp_error(w) for w in worlds]
+    visible = psnr([e[m == VISIBLE] for e, m in zip(exact, labels, strict=True)])
+    occluded = psnr([e[m == OCCLUDED] for e, m in zip(exact, labels, strict=True)])
+    half = psnr([warp_error(w, 0.5)[m == VISIBLE] for w, m in zip(worlds, labels, strict=True)])
+    wrong_sign = psnr([warp_error(w, sign=1.0)[m == VISIBLE] for w, m in zip(worlds, labels, strict=True)])
+    print(
+        f"warp PSNR: visible {visible:.2f} dB, occluded {occluded:.2f} dB, "
+        f"half a pixel off {half:.2f} dB, wrong sign {wrong_sign:.2f} dB"
+    )
+    assert visible > 24.0
+    assert occluded < visible - 6.0
+    assert half < visible - 1.0
+    assert wrong_sign < visible - 6.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("eye", EYES)
+def test_occlusion_agrees_with_the_other_eyes_disparity(worlds: list[World], eye: Eye) -> None:
+    """A visible point is seen at the same disparity by the other eye, an occluded one behind something nearer."""
+    sign, other_eye = (-1.0, "right") if eye == "left" else (1.0, "left")
+    visible_agrees, occluded_agrees = [], []
+    for world in worlds:
+        own, other = world.targets[eye], world.targets[other_eye]
+        height, width = own.disparity.shape
+        rows, columns = np.mgrid[:height, :width]
+        x = columns + sign * own.disparity
+        near = [np.clip(np.floor(x).astype(int) + k, 0, width - 1) for k in (0, 1)]
+        seen = np.stack([other.disparity[rows, column] for column in near])
+        # The two neighbours bracket the point unless a silhouette runs between them.
+        tolerance = np.abs(seen[0] - seen[1]) + 0.05
+        same = np.abs(seen - own.disparity).min(axis=0) <= tolerance
+        nearer = seen.max(axis=0) > own.disparity + 1e-3
+        visible_agrees.append(same[own.occlusion == VISIBLE])
+        occluded_agrees.append(nearer[own.occlusion == OCCLUDED])
+    assert np.concatenate(visible_agrees).mean() > 0.99
+    assert np.concatenate(occluded_agrees).mean() > 0.99
+
+
+def test_scratch_folder_is_left_clean(tmp_path: Path) -> None:
+    config = FAMILIES["flying_things"].config(width=64, height=36)
+    scene = sample_scene(np.random.default_rng(0), "flying_things", config)
+    list(render_frames(scene, tmp_path, RenderOptions(samples=1)))
+    assert [path.name for path in tmp_path.iterdir()] == ["blender.log"]

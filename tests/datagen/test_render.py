@@ -1,0 +1,141 @@
+"""Data sets: the same bytes every time, however the work was spread or interrupted; clear refusals."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
+from datagen.layout import Layout
+from scenes import FAMILIES
+
+CONFIG = FAMILIES["flying_things"].config
+RECIPE = Recipe(CONFIG(width=96, height=54, frames=2), {"train": 3, "test": 2}, seed=5, samples=2)
+
+
+def hashes(root: Path) -> dict[str, str]:
+    """SHA-256 of every file; of manifests only what they say of the files, since timings differ."""
+    found = {}
+    for path in sorted(path for path in root.rglob("*") if path.is_file()):
+        name = path.relative_to(root).as_posix()
+        data = path.read_bytes()
+        if name.startswith("manifest/"):
+            manifest = json.loads(data)
+            del manifest["seconds"]
+            data = json.dumps(manifest).encode()
+        found[name] = hashlib.sha256(data).hexdigest()
+    return found
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("reference") / "set"
+    summary = render_dataset(RECIPE, root, workers=1)
+    assert (summary.rendered, summary.already_there, summary.failures) == (5, 0, ())
+    return root
+
+
+@pytest.mark.slow
+def test_same_recipe_same_bytes_with_other_workers(reference: Path, tmp_path: Path) -> None:
+    render_dataset(RECIPE, tmp_path / "set", workers=2)
+    assert hashes(tmp_path / "set") == hashes(reference)
+
+
+@pytest.mark.slow
+def test_killed_run_continues_to_the_same_bytes(reference: Path, tmp_path: Path) -> None:
+    root = tmp_path / "set"
+    code = (
+        "from tests.datagen.test_render import RECIPE\nfrom datagen import render_dataset\n"
+        f"if __name__ == '__main__':\n    render_dataset(RECIPE, {str(root)!r}, workers=1)\n"
+    )
+    script = tmp_path / "run.py"
+    script.write_text(code)
+    environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
+    process = subprocess.Popen([sys.executable, str(script)], env=environment, start_new_session=True)
+    deadline = time.monotonic() + 60
+    while not Layout(root).committed_scenes("train") and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    # What a kill between moving a scene's folders and writing its manifest leaves behind.
+    orphan = Layout(root).file("disparity", "test", 1, "left", 6)
+    orphan.parent.mkdir(parents=True, exist_ok=True)
+    orphan.write_bytes(b"half")
+    before = sum(len(Layout(root).committed_scenes(split)) for split in ("train", "test"))
+    assert 0 < before < 5
+    summary = render_dataset(RECIPE, root, workers=2)
+    assert (summary.rendered, summary.already_there) == (5 - before, before)
+    assert hashes(root) == hashes(reference)
+
+
+def test_a_finished_set_renders_nothing_and_can_grow(reference: Path) -> None:
+    assert render_dataset(RECIPE, reference).rendered == 0
+    before = hashes(reference)
+    summary = render_dataset(replace(RECIPE, scenes={"val": 1}), reference, workers=1)
+    assert summary.rendered == 1
+    assert read_recipe(reference / "recipe.yaml").scenes == {"train": 3, "val": 1, "test": 2}
+    after = hashes(reference)
+    del before["recipe.yaml"]
+    assert before.items() <= after.items()
+    # Leave the shared folder as the other tests expect it.
+    for path in [path for path in reference.rglob("*") if "VAL" in path.parts and path.is_file()]:
+        path.unlink()
+    (reference / "recipe.yaml").unlink()
+    render_dataset(RECIPE, reference)
+
+
+@pytest.mark.slow
+def test_shards_make_up_the_whole(reference: Path, tmp_path: Path) -> None:
+    for index in range(2):
+        render_dataset(RECIPE, tmp_path / "set", workers=1, shard=(index, 2))
+    assert hashes(tmp_path / "set") == hashes(reference)
+
+
+def test_samples_differ_between_scenes_frames_and_splits(reference: Path) -> None:
+    samples = [sample for split in ("train", "test") for sample in StereoDataset(reference, split)]
+    assert len(samples) == 10
+    assert len({sample.left.tobytes() for sample in samples}) == 10
+    assert len({sample.disparity_left.tobytes() for sample in samples}) == 10
+
+
+def test_other_settings_in_the_same_folder_are_refused(reference: Path) -> None:
+    with pytest.raises(DatasetError, match="seed 5, not 6"):
+        render_dataset(replace(RECIPE, seed=6), reference)
+    with pytest.raises(DatasetError, match=r"world\.width 96, not 128"):
+        render_dataset(replace(RECIPE, world=CONFIG(width=128, height=54, frames=2)), reference)
+
+
+def test_a_folder_with_something_else_in_it_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("do not touch")
+    with pytest.raises(DatasetError, match="neither empty nor a data set"):
+        render_dataset(RECIPE, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("world: {family: flying_things, width: 0}\nscenes: {train: 1}\n", "width must be at least 1"),
+        ("world: {family: swimming_things}\nscenes: {train: 1}\n", "flying_things"),
+        ("world: {family: flying_things}\nscenes: {train: 1}\nsede: 4\n", "sede"),
+        ("world: {family: flying_things}\nscenes: {dev: 1}\n", "there is no split 'dev'"),
+        ("- just\n- a list\n", "not a valid recipe"),
+        ("a: [1\n", "cannot read the recipe"),
+    ],
+)
+def test_a_broken_recipe_is_refused_in_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "recipe.yaml"
+    path.write_text(text)
+    with pytest.raises(DatasetError, match=sentence) as refusal:
+        read_recipe(path)
+    assert "recipe.yaml" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
