@@ -8,6 +8,7 @@ of chunks are checked here first against the exact layout that `write_gradient` 
 from __future__ import annotations
 
 import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,19 @@ _MAGIC_AND_VERSION = struct.pack("<II", 20000630, 2)
 _ZIP = 3
 _LINES_PER_CHUNK = 16
 _FLOAT = 2
-_MAX_ATTRIBUTES = 64
 _INCREASING_Y = 0
+_ATTRIBUTE_TYPES = {
+    "channels": "chlist",
+    "compression": "compression",
+    "dataWindow": "box2i",
+    "displayWindow": "box2i",
+    "lineOrder": "lineOrder",
+    "pixelAspectRatio": "float",
+    "screenWindowCenter": "v2f",
+    "screenWindowWidth": "float",
+    "type": "string",
+}
+"""All that such a file needs; OpenEXR prints warnings about others that we could not turn into an error."""
 
 
 def read_gradient(path: Path | str) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -85,7 +97,7 @@ def _check_layout(path: Path, data: bytes) -> tuple[int, int]:
 
 
 def _parse_attributes(data: bytes) -> tuple[dict[str, bytes], int]:
-    """The header's attributes by name, and where the table of chunks begins. ValueError if it runs out."""
+    """The header's attributes by name, and where the table of chunks begins. ValueError says what is odd."""
     attributes: dict[str, bytes] = {}
     position = len(_MAGIC_AND_VERSION)
     while data[position : position + 1] != b"\0":
@@ -93,9 +105,9 @@ def _parse_attributes(data: bytes) -> tuple[dict[str, bytes], int]:
         type_end = data.index(b"\0", name_end + 1, name_end + 33)
         (size,) = struct.unpack_from("<I", data, type_end + 1)
         end = type_end + 5 + size
-        name = data[position:name_end].decode("ascii")
-        if end >= len(data) or name in attributes or len(attributes) >= _MAX_ATTRIBUTES:
-            raise ValueError(f"attribute {name!r} is too long, repeated, or one too many")
+        name, kind = data[position:name_end].decode("ascii"), data[name_end + 1 : type_end].decode("ascii")
+        if _ATTRIBUTE_TYPES.get(name) != kind or name in attributes or end >= len(data):
+            raise ValueError(f"attribute {name!r} is unknown, repeated or too long")
         attributes[name] = data[type_end + 5 : end]
         position = end
     return attributes, position + 1
@@ -127,5 +139,21 @@ def _check_chunks(path: Path, data: bytes, table: int, width: int, top: int, hei
         if line != top + index * _LINES_PER_CHUNK or not 0 < size <= raw_size:
             raise FormatError(f"{path}: is an EXR file whose chunk {index} of {count} has a damaged head")
         position += 8 + size
+        if size < raw_size and not _inflates(data[position - size : position], raw_size):
+            raise FormatError(f"{path}: is an EXR file whose chunk {index} of {count} does not decompress")
     if position != len(data):
         raise FormatError(f"{path}: has {len(data)} bytes where its chunks end at {position}")
+
+
+def _inflates(packed: bytes, raw_size: int) -> bool:
+    """Whether a chunk is one zlib stream of the right size and checksum.
+
+    OpenEXR would print a warning and give no pixels. A chunk that is not smaller packed is stored as it is.
+    """
+    stream = zlib.decompressobj()
+    try:
+        # One byte more than there should be, so that the stream's checksum is read too.
+        raw = stream.decompress(packed, raw_size + 1)
+    except zlib.error:
+        return False
+    return len(raw) == raw_size and stream.eof

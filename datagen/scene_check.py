@@ -1,0 +1,202 @@
+"""All checks of one finished scene: its manifest, its files, its Scene record, its frames' arrays."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from datagen.checks import (
+    check_disparity,
+    check_geometry,
+    check_gradient,
+    check_images,
+    check_object_index,
+    check_views,
+)
+from datagen.dataset import StereoSample, read_scene
+from datagen.errors import DatasetError
+from datagen.formats import read_camera_data
+from datagen.layout import EYES, FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, Eye, Layout
+from datagen.manifest import FileEntry, SceneManifest, read_manifest
+from datagen.raycast import SceneRayCaster
+from datagen.recipe import Recipe
+from scenes import Scene
+
+SAMPLED_PIXELS = 500
+"""How many random pixels of each view are compared with the scene's geometry by ray casts."""
+POSE_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong."""
+
+    place: str
+    """The file, scene or folder, relative to the data set's root."""
+    message: str
+    split: str | None = None
+    scene: int | None = None
+    """The scene to render again; None where no scene is to blame."""
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.message}"
+
+
+@dataclass
+class SceneCheck:
+    """Checks one scene; `run` gathers what is wrong in `problems` and never raises for damaged data."""
+
+    layout: Layout
+    recipe: Recipe
+    split: str
+    scene: int
+    problems: list[Problem] = field(default_factory=list)
+    known: set[str] = field(default_factory=set)
+    """The scene's files, relative to the root."""
+    frames: int = 0
+    files: int = 0
+    bytes_read: int = 0
+    _whole: set[str] = field(default_factory=set)
+    """Those of the files that are as they were written."""
+
+    def run(self) -> SceneCheck:
+        path = self.layout.manifest(self.split, self.scene)
+        self.known.add(self.layout.relative(path))
+        try:
+            manifest = read_manifest(path)
+        except DatasetError as error:
+            self._found(path, str(error))
+            return self
+        self._check_head(path, manifest)
+        self.known.update(entry.path for entry in manifest.files)
+        self._whole.update(entry.path for entry in manifest.files if self._is_whole(entry))
+        record = self.layout.scene_record(self.split, self.scene)
+        if self._are_readable([record]):
+            try:
+                scene = read_scene(record)
+                self._check_contents(scene, SceneRayCaster(scene))
+            except ValueError as error:
+                self._found(record, str(error))
+        return self
+
+    def _found(self, path: Path, message: str) -> None:
+        """Note a problem; a message that begins with the path is not told it twice."""
+        message = message.removeprefix(f"{path}: ")
+        self.problems.append(Problem(self.layout.relative(path), message, self.split, self.scene))
+
+    def _check_head(self, path: Path, manifest: SceneManifest) -> None:
+        if (manifest.split, manifest.scene) != (self.split, self.scene):
+            self._found(path, f"is the manifest of {manifest.split} scene {manifest.scene}")
+        if manifest.recipe_sha256 != self.recipe.settings_sha256():
+            self._found(path, "was rendered with other settings than the recipe's")
+
+    def _is_whole(self, entry: FileEntry) -> bool:
+        """Compare one file with its manifest entry."""
+        path = self.layout.root / entry.path
+        self.files += 1
+        try:
+            with path.open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+                size = file.tell()
+        except OSError as error:
+            self._found(path, f"cannot be read: {error.strerror}")
+            return False
+        self.bytes_read += size
+        if size != entry.size:
+            self._found(path, f"has {size} bytes where the manifest has {entry.size}")
+        elif digest != entry.sha256:
+            self._found(path, "is damaged, its SHA-256 is not the manifest's")
+        return (size, digest) == (entry.size, entry.sha256)
+
+    def _are_readable(self, paths: list[Path]) -> bool:
+        """Whether files that the scene must have are whole; one the manifest does not list is a problem."""
+        names = [self.layout.relative(path) for path in paths]
+        for path, name in zip(paths, names, strict=True):
+            if name not in self.known:
+                self._found(path, "is part of the scene but not in its manifest")
+        return self._whole.issuperset(names)
+
+    def _check_contents(self, scene: Scene, caster: SceneRayCaster) -> None:
+        camera_data = self.layout.file("camera_data", self.split, self.scene)
+        if self._are_readable([camera_data]):
+            for message in _check_camera_data(camera_data, scene):
+                self._found(camera_data, message)
+        for instant in range(scene.frames):
+            self.frames += 1
+            if self._are_readable(self._frame_files(FIRST_FRAME + instant)):
+                self._check_frame(scene, caster, instant)
+
+    def _frame_files(self, frame: int) -> list[Path]:
+        kinds = [RENDER_PASSES[name] for name in self.recipe.passes]
+        kinds += [kind for kind in TARGETS if KINDS[kind].per_eye]
+        return [self.layout.file(kind, self.split, self.scene, eye, frame) for kind in kinds for eye in EYES]
+
+    def _check_frame(self, scene: Scene, caster: SceneRayCaster, instant: int) -> None:
+        """Check the arrays of one frame, all of whose files are as they were written."""
+        frame = FIRST_FRAME + instant
+        folder = self.layout.scene_folder("disparity", self.split, self.scene)
+        samples = [
+            StereoSample(self.layout, self.split, self.scene, frame, name) for name in self.recipe.passes
+        ]
+        try:
+            for sample in samples:
+                path = self.layout.file(
+                    RENDER_PASSES[sample.render_pass], self.split, self.scene, "right", frame
+                )
+                for message in _check_pictures(sample, scene):
+                    self._found(path, message)
+            for eye in EYES:
+                path = self.layout.file("disparity", self.split, self.scene, eye, frame)
+                for message in self._check_targets(samples[0], eye, scene, caster, instant):
+                    self._found(path, message)
+        except DatasetError as error:
+            self._found(folder, str(error))
+
+    def _check_targets(
+        self, sample: StereoSample, eye: Eye, scene: Scene, caster: SceneRayCaster, instant: int
+    ) -> Iterator[str]:
+        view, other = (sample.view(eye), sample.view("right" if eye == "left" else "left"))
+        yield from check_disparity(view.disparity)
+        yield from check_gradient(
+            view.disparity, view.gradient, view.gradient_valid, self.recipe.gradient_threshold_px
+        )
+        yield from check_object_index(view.object_index, view.disparity, len(scene.objects))
+        yield from check_views(eye, view.disparity, other.disparity, view.occlusion)
+        rng = np.random.default_rng((self.scene, instant, EYES.index(eye)))
+        pixels = rng.integers(0, view.disparity.size, SAMPLED_PIXELS)
+        rows, columns = np.unravel_index(pixels, view.disparity.shape)
+        yield from check_geometry(
+            view.disparity[rows, columns],
+            view.object_index[rows, columns],
+            caster.cast(eye, instant, rows, columns),
+        )
+
+
+def _check_camera_data(path: Path, scene: Scene) -> Iterator[str]:
+    """The poses on disk are those of the scene's camera."""
+    try:
+        poses = read_camera_data(path)
+    except DatasetError as error:
+        yield str(error)
+        return
+    expected = {FIRST_FRAME + k: [scene.camera.pose(eye, k) for eye in EYES] for k in range(scene.frames)}
+    if poses.keys() != expected.keys():
+        yield f"has the frames {sorted(poses)} where the scene has {sorted(expected)}"
+        return
+    for frame, matrices in poses.items():
+        if not np.allclose(matrices, expected[frame], rtol=0, atol=POSE_TOLERANCE):
+            yield f"the poses of frame {frame} are not those of the scene's camera"
+
+
+def _check_pictures(sample: StereoSample, scene: Scene) -> Iterator[str]:
+    """The pictures have the camera's size, and belong to the disparity."""
+    size = (scene.camera.height, scene.camera.width)
+    if sample.size != size:
+        raise DatasetError(
+            f"the images of {sample.name} are {sample.size} where the scene's camera makes {size}"
+        )
+    yield from check_images(sample.left, sample.right, sample.disparity_left, sample.occlusion_left)
