@@ -27,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         prog="stereoforge",
         description="Make stereo training sets in Blender, train stereo networks on them, refine disparity.",
         args=[word for word in words if word != DEBUG_FLAG],
-        config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagConversionOff, tyro.conf.HelptextFromCommentsOff),
+        config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff),
     )
     try:
         command.run()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import tyro
@@ -31,3 +32,17 @@ def parse_shard(text: str) -> tuple[int, int]:
     if not match or int(match[1]) >= int(match[2]):
         raise UsageError(f"--shard takes I/N with 0 <= I < N, such as 0/16, not {text!r}")
     return int(match[1]), int(match[2])
+
+
+def parse_weighted_folder(text: str) -> tuple[Path, float]:
+    """(folder, weight) of "folder" (weight 1) or "folder:2.5"; a folder that has such a name wins."""
+    if Path(text).exists() or ":" not in text:
+        return Path(text), 1.0
+    folder, _, number = text.rpartition(":")
+    try:
+        weight = float(number)
+    except ValueError:
+        return Path(text), 1.0
+    if not 0 < weight < float("inf"):
+        raise UsageError(f"--data {text}: the weight must be positive, got {number}")
+    return Path(folder), weight

@@ -4,6 +4,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 from stereoforge.commands.render import Render
+from stereoforge.commands.train import Train
+from stereoforge.commands.verify import Verify
 
 
 class Command(Protocol):
@@ -13,5 +15,9 @@ class Command(Protocol):
         """Do the work; whatever it raises becomes one sentence and an exit code."""
 
 
-COMMANDS: dict[str, Callable[..., Command]] = {"render": Render}
+COMMANDS: dict[str, Callable[..., Command]] = {
+    "render": Render,
+    "verify": Verify,
+    "train": Train,
+}
 """Every command by its name, in the order of use."""

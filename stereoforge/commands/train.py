@@ -1,0 +1,70 @@
+"""`stereoforge train`: one network, from data sets to weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from stereoforge.errors import UsageError
+from stereoforge.progress import console
+from stereoforge.values import parse_weighted_folder, shown
+
+
+@dataclass(frozen=True)
+class Train:
+    """Train a network on the train splits of data sets; their val splits decide which weights are kept.
+
+    The run folder collects the networks: train the regressor first, then confnet and gradnet into the same
+    folder (or name the regressor's with --init).
+    """
+
+    task: Annotated[
+        tyro.conf.Positional[Literal["regressor", "regressor_f", "confnet", "gradnet"]], shown("TASK")
+    ]
+    """regressor (DispNetCorr1D), regressor_f (fine-tuned on gradients too), confnet or gradnet."""
+    data: Annotated[tuple[str, ...], shown("DIR[:WEIGHT]")]
+    """Data sets, each with how often it is drawn from relative to the others (default 1)."""
+    out: Annotated[Path, shown("RUN")]
+    """Run folder."""
+    preset: Literal["tiny", "small", "full"] = "small"
+    """tiny: minutes on a laptop; small: hours; full: the paper's own training."""
+    init: Annotated[Path | None, shown("RUN", "none")] = None
+    """Run folder of the regressor to start from or to build on."""
+    resume: bool = False
+    """Continue from the last checkpoint as if never interrupted."""
+    steps: Annotated[int | None, shown("N", "the preset's")] = None
+    """Optimizer steps; all schedules are scaled to them."""
+    seed: Annotated[int, shown("N")] = 0
+    """Everything random follows from it."""
+    workers: Annotated[int, shown("N")] = 0
+    """Processes that prepare crops; results do not depend on their number."""
+    device: Annotated[str, shown("NAME")] = "auto"
+    """auto, cpu, cuda, cuda:1, ..."""
+
+    def run(self) -> None:
+        for name, value, least in (("steps", self.steps, 1), ("seed", self.seed, 0), ("workers", self.workers, 0)):
+            if value is not None and value < least:
+                raise UsageError(f"--{name} must be at least {least}, got {value}")
+        data = [parse_weighted_folder(text) for text in self.data]
+        from training.train import train
+
+        summary = train(
+            self.task,
+            data,
+            self.out,
+            self.preset,
+            init=self.init,
+            resume=self.resume,
+            steps=self.steps,
+            seed=self.seed,
+            workers=self.workers,
+            device=self.device,
+        )
+        figures = ", ".join(f"{name} {value:.4g}" for name, value in summary.validation.items())
+        console.print(
+            f"{self.out / self.task}.safetensors: step {summary.best_step} of {summary.steps}"
+            + (f"; validation {figures}" if figures else "; no validation split, so the last weights are kept")
+        )
