@@ -1,0 +1,1 @@
+"""Training of the networks on stereo data sets, and prediction with what was trained."""

@@ -1,0 +1,248 @@
+"""Stereo data sets as a stream of training crops and a list of validation frames.
+
+Every crop of a run has a number, its draw. Which frame a draw takes and how it is augmented follow from the seed and
+that number alone, so results depend neither on the number of workers nor on where a run was interrupted.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import pytorch_lightning as pl
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.utils.data import DataLoader, Dataset
+
+from datagen import StereoDataset
+from training.augmentation import (
+    IDENTITY_CURVE,
+    StereoPair,
+    TrainingSample,
+    Window,
+    augment,
+    cut,
+)
+from training.errors import TrainingError
+from training.presets import Preset
+
+DEFAULT_CACHE_BYTES = 2 << 30
+IMAGE_MEAN_FRAMES = 100
+
+Batch = dict[str, Tensor]
+"""`left`, `right` (B, 3, H, W) in 0..1, `disparity` (B, 1, H, W), `gradient` (B, 2, H, W), NaN invalid."""
+
+
+class Frame(Protocol):
+    """What training reads of a `datagen.StereoSample`."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def left(self) -> NDArray[np.uint8]: ...
+    @property
+    def right(self) -> NDArray[np.uint8]: ...
+    @property
+    def disparity_left(self) -> NDArray[np.float32]: ...
+    @property
+    def disparity_right(self) -> NDArray[np.float32]: ...
+
+
+@dataclass(frozen=True)
+class Source:
+    """A data set and how often it is drawn from, relative to the others."""
+
+    frames: Sequence[Frame]
+    weight: float = 1.0
+
+
+def read_pair(frame: Frame) -> StereoPair:
+    """Decode what training needs of a frame."""
+    return StereoPair(frame.left, frame.right, frame.disparity_left, frame.disparity_right)
+
+
+class PairCache:
+    """The decoded frames of all sources; the first of them, up to a number of bytes, stay in memory.
+
+    Filled before worker processes are forked, so that they share it.
+    """
+
+    def __init__(self, sources: Sequence[Source], capacity_bytes: int = DEFAULT_CACHE_BYTES) -> None:
+        self._sources = sources
+        self._pairs: dict[tuple[int, int], StereoPair] = {}
+        for key in self._interleaved():
+            pair = read_pair(sources[key[0]].frames[key[1]])
+            capacity_bytes -= pair.nbytes
+            if capacity_bytes < 0:
+                break
+            self._pairs[key] = pair
+
+    def __getitem__(self, key: tuple[int, int]) -> StereoPair:
+        """The pair of (source, frame)."""
+        pair = self._pairs.get(key)
+        return read_pair(self._sources[key[0]].frames[key[1]]) if pair is None else pair
+
+    def first(self, count: int) -> Iterator[StereoPair]:
+        """The first pairs, all sources in turn."""
+        return (self[key] for key in itertools.islice(self._interleaved(), count))
+
+    def _interleaved(self) -> Iterator[tuple[int, int]]:
+        longest = max(len(source.frames) for source in self._sources)
+        for frame in range(longest):
+            for index, source in enumerate(self._sources):
+                if frame < len(source.frames):
+                    yield index, frame
+
+
+def schedule_draws(sources: Sequence[Source], draws: int, seed: int) -> NDArray[np.int64]:
+    """Which (source, frame) each draw takes, (draws, 2): sources by weight, frames in a new order every pass.
+
+    A longer schedule begins with the shorter one.
+    """
+    weights = np.array([source.weight for source in sources], np.float64)
+    rng = np.random.default_rng([seed, 0])
+    chosen = np.searchsorted(np.cumsum(weights / weights.sum())[:-1], rng.random(draws), side="right")
+    schedule = np.empty((draws, 2), np.int64)
+    for index, source in enumerate(sources):
+        places = np.flatnonzero(chosen == index)
+        order = np.random.default_rng([seed, 1, index])
+        passes = [order.permutation(len(source.frames)) for _ in range(-(-len(places) // len(source.frames)))]
+        schedule[places, 0] = index
+        schedule[places, 1] = np.concatenate([*passes, np.empty(0, np.int64)])[: len(places)]
+    return schedule
+
+
+class CropDataset(Dataset[Batch]):
+    """Draw number to augmented crop."""
+
+    def __init__(
+        self, cache: PairCache, schedule: NDArray[np.int64], preset: Preset, seed: int, draws_per_step: int
+    ) -> None:
+        self._cache = cache
+        self._schedule = schedule
+        self._preset = preset
+        self._seed = seed
+        self._draws_per_step = draws_per_step
+
+    def __getitem__(self, draw: int) -> Batch:
+        source, frame = self._schedule[draw]
+        rng = np.random.default_rng([self._seed, 2, draw])
+        sample = augment(
+            rng,
+            self._cache[int(source), int(frame)],
+            (self._preset.crop_height, self._preset.crop_width),
+            self._preset.augmentation,
+            step=draw // self._draws_per_step,
+        )
+        return as_tensors(sample)
+
+
+class FrameDataset(Dataset[Batch]):
+    """Whole frames, as they are."""
+
+    def __init__(self, frames: Sequence[Frame]) -> None:
+        self._frames = frames
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, index: int) -> Batch:
+        pair = read_pair(self._frames[index])
+        height, width = pair.disparity_left.shape
+        whole = cut(pair, Window(0.0, 0.0, 1.0, 1.0), (height, width), (IDENTITY_CURVE, IDENTITY_CURVE))
+        return as_tensors(whole)
+
+
+def as_tensors(sample: TrainingSample) -> Batch:
+    """One sample, channels first."""
+    return {
+        "left": torch.from_numpy(sample.left).permute(2, 0, 1).contiguous(),
+        "right": torch.from_numpy(sample.right).permute(2, 0, 1).contiguous(),
+        "disparity": torch.from_numpy(sample.disparity)[None],
+        "gradient": torch.from_numpy(sample.gradient).permute(2, 0, 1).contiguous(),
+    }
+
+
+class StereoDataModule(pl.LightningDataModule):
+    """Training crops in blocks of `validation_interval` steps (Lightning's epochs), and validation frames."""
+
+    def __init__(
+        self,
+        sources: Sequence[Source],
+        validation: Sequence[Frame],
+        preset: Preset,
+        steps: int,
+        seed: int,
+        workers: int = 0,
+        cache_bytes: int = DEFAULT_CACHE_BYTES,
+    ) -> None:
+        super().__init__()
+        self._preset = preset
+        self._steps = steps
+        self._seed = seed
+        self._workers = workers
+        self._sources = sources
+        self._cache = PairCache(sources, cache_bytes)
+        spread = np.linspace(0, len(validation) - 1, min(preset.validation_samples, len(validation)))
+        self._validation = FrameDataset([validation[round(i)] for i in spread])
+
+    def image_mean(self) -> NDArray[np.float32]:
+        """Mean colour (3,) in 0..1 of the first frames of all sources, both views."""
+        images = [view for pair in self._cache.first(IMAGE_MEAN_FRAMES) for view in (pair.left, pair.right)]
+        mean: NDArray[np.float32] = np.mean([image.mean((0, 1)) for image in images], axis=0) / 255
+        return mean.astype(np.float32)
+
+    def train_dataloader(self) -> DataLoader[Batch]:
+        """The crops of the current block; with several processes, this process's share of every step."""
+        assert self.trainer is not None
+        return self.block(self.trainer.current_epoch, self.trainer.global_rank, self.trainer.world_size)
+
+    def block(self, number: int, rank: int = 0, processes: int = 1) -> DataLoader[Batch]:
+        """The crops of the steps [number * validation_interval, (number + 1) * validation_interval)."""
+        size = self._preset.batch_size
+        per_step = size * processes
+        schedule = schedule_draws(self._sources, self._steps * per_step, self._seed)
+        interval = self._preset.validation_interval
+        steps = range(number * interval, min((number + 1) * interval, self._steps))
+        batches = [list(range(s * per_step + rank * size, s * per_step + (rank + 1) * size)) for s in steps]
+        crops = CropDataset(self._cache, schedule, self._preset, self._seed, per_step)
+        return DataLoader(crops, batch_sampler=batches, num_workers=self._workers)
+
+    def val_dataloader(self) -> DataLoader[Batch] | list[DataLoader[Batch]]:
+        return DataLoader(self._validation, batch_size=1) if len(self._validation) else []
+
+
+def open_sources(
+    folders: Sequence[tuple[Path, float]], crop: tuple[int, int]
+) -> tuple[list[Source], list[Frame]]:
+    """The training split of each folder with its weight, and all their validation splits' frames.
+
+    Args:
+        crop: (height, width) that every training frame must hold.
+
+    Raises:
+        TrainingError: no folder, a weight that is not positive, or frames smaller than the crop.
+        DatasetError: a folder that is no data set or has no training split.
+    """
+    if not folders:
+        raise TrainingError("training needs at least one data set")
+    sources: list[Source] = []
+    validation: list[Frame] = []
+    for folder, weight in folders:
+        if not weight > 0:
+            raise TrainingError(f"{folder}: the weight of a data set must be positive, got {weight}")
+        frames = StereoDataset(folder, "train")
+        height, width = frames[0].size
+        if height < crop[0] or width < crop[1]:
+            raise TrainingError(
+                f"{folder}: frames of {width}x{height} are smaller than the preset's {crop[1]}x{crop[0]} crops"
+            )
+        sources.append(Source(frames, weight))
+        if frames.layout.committed_scenes("val"):
+            validation.extend(StereoDataset(folder, "val"))
+    return sources, validation

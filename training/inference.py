@@ -1,0 +1,93 @@
+"""What the networks say about a pair of any size. Used by validation and by `StereoPredictor` alike."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from torch import Tensor
+
+from training.networks import ConfNet, DispNetCorr1D, GradNet, full_resolution, left_right_consistency
+from training.networks.dispnet import STRIDE
+
+
+class Regression(NamedTuple):
+    """A regressor's answer to a batch."""
+
+    disparity: Tensor
+    """(B, 1, H, W) px of the input, not negative."""
+    features: Tensor
+    """(B, F, H/2, W/2) matching features."""
+
+
+class Estimate(NamedTuple):
+    """The networks' answer to a batch; None where there is no such network."""
+
+    disparity: Tensor
+    """(B, 1, H, W) px of the input."""
+    confidence: Tensor | None
+    """(B, 1, H, W) in 0..1."""
+    gradient: Tensor | None
+    """(B, 2, H, W) px per pixel, [dx, dy]."""
+
+
+def regress(regressor: DispNetCorr1D, left: Tensor, right: Tensor) -> Regression:
+    """Disparity and features of images (B, 3, H, W) whose sides are multiples of 64."""
+    output = regressor(left, right)
+    disparity = F.relu(full_resolution(output.disparities[-1], left.shape[-2:]))
+    return Regression(disparity, output.features)
+
+
+def regress_consistently(regressor: DispNetCorr1D, left: Tensor, right: Tensor) -> tuple[Regression, Tensor]:
+    """Disparity and features of the left view, and the left-right-consistency map (B, 1, H, W), in one pass.
+
+    The right view's disparity is that of the mirrored, swapped pair (`predict_right`), here in the same batch.
+    """
+    batch = left.shape[0]
+    both = regress(regressor, torch.cat([left, right.flip(-1)]), torch.cat([right, left.flip(-1)]))
+    disparity_left, disparity_right = both.disparity[:batch], both.disparity[batch:].flip(-1)
+    consistency = left_right_consistency(disparity_left, disparity_right)
+    return Regression(disparity_left, both.features[:batch]), consistency
+
+
+def network_size(height: int, width: int) -> tuple[int, int]:
+    """The next multiples of 64, which the original network resizes its input to."""
+    return -(-height // STRIDE) * STRIDE, -(-width // STRIDE) * STRIDE
+
+
+@torch.no_grad()
+def estimate(
+    regressor: DispNetCorr1D, confnet: ConfNet | None, gradnet: GradNet | None, left: Tensor, right: Tensor
+) -> Estimate:
+    """Resize to multiples of 64 (no padding), predict, resize back.
+
+    With the input stretched by (sx, sy), a disparity comes out sx times too large, the horizontal gradient
+    unchanged (disparity and pixel stretch alike), the vertical one sx / sy times too large.
+
+    Args:
+        left, right: (B, 3, H, W) in 0..1.
+    """
+    height, width = left.shape[-2:]
+    inner_height, inner_width = network_size(height, width)
+    left, right = (resize(view, inner_height, inner_width) for view in (left, right))
+    stretch_x, stretch_y = inner_width / width, inner_height / height
+
+    confidence = gradient = None
+    if confnet is None:
+        regression = regress(regressor, left, right)
+    else:
+        regression, consistency = regress_consistently(regressor, left, right)
+        confidence = confnet.confidence(left, regression.features, consistency)
+        confidence = resize(confidence, height, width)
+    if gradnet is not None:
+        gradient = resize(gradnet(left, regression.features), height, width)
+        gradient = gradient * gradient.new_tensor([1.0, stretch_y / stretch_x]).view(1, 2, 1, 1)
+    return Estimate(resize(regression.disparity, height, width) / stretch_x, confidence, gradient)
+
+
+def resize(maps: Tensor, height: int, width: int) -> Tensor:
+    """Bilinear, with the filter widened when shrinking; the same maps when the size is right already."""
+    if maps.shape[-2:] == (height, width):
+        return maps
+    return F.interpolate(maps, size=(height, width), mode="bilinear", align_corners=False, antialias=True)

@@ -1,0 +1,104 @@
+"""Prediction with a run folder's networks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from training.errors import TrainingError
+from training.inference import estimate
+from training.networks import ConfNet, GradNet
+from training.weights import StoredNetwork, has_weights, load_confnet, load_gradnet, load_regressor
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What the networks say about one pair."""
+
+    disparity: NDArray[np.float32]
+    """(H, W) px of the input, left view."""
+    confidence: NDArray[np.float32] | None
+    """(H, W) in 0..1, or None without a ConfNet."""
+    gradient: NDArray[np.float32] | None
+    """(H, W, 2) forward differences [dx, dy], or None without a GradNet."""
+
+
+class StereoPredictor:
+    """The networks of a run folder, ready to predict.
+
+    Images are resized (not padded) to multiples of 64, as the original network's are, and the answers resized back.
+    """
+
+    def __init__(self, run: Path | str, device: str = "cpu", regressor: str = "regressor") -> None:
+        """Read what the folder holds; ConfNet and GradNet are optional.
+
+        Args:
+            regressor: `regressor`, or `regressor_f`, whose disparity comes without confidence and gradient: those
+                networks know the features of the `regressor` only.
+
+        Raises:
+            TrainingError: no regressor, damaged files, or a ConfNet or GradNet trained on another regressor.
+        """
+        run = Path(run)
+        self._device = torch.device(device)
+        stored = load_regressor(run, regressor)
+        self._regressor = stored.network.to(self._device)
+        self._confnet: ConfNet | None = None
+        self._gradnet: GradNet | None = None
+        if regressor == "regressor" and has_weights(run, "confnet"):
+            self._confnet = _matching(run, "confnet", load_confnet(run), stored.sha256).to(self._device)
+        if regressor == "regressor" and has_weights(run, "gradnet"):
+            self._gradnet = _matching(run, "gradnet", load_gradnet(run), stored.sha256).to(self._device)
+
+    def predict(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> Prediction:
+        """Predict the left view's maps.
+
+        Args:
+            left, right: (H, W, 3) uint8 sRGB, rectified.
+
+        Raises:
+            TrainingError: images of another kind, or of different sizes.
+        """
+        for name, image in (("left", left), ("right", right)):
+            if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
+                raise TrainingError(
+                    f"the {name} image must be (H, W, 3) of uint8, got {image.shape} of {image.dtype}"
+                )
+        if left.shape != right.shape:
+            raise TrainingError(
+                f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
+                f"right {right.shape[1]}x{right.shape[0]}"
+            )
+        answer = estimate(
+            self._regressor, self._confnet, self._gradnet, self._as_tensor(left), self._as_tensor(right)
+        )
+        return Prediction(
+            disparity=_as_array(answer.disparity)[..., 0],
+            confidence=None if answer.confidence is None else _as_array(answer.confidence)[..., 0],
+            gradient=None if answer.gradient is None else _as_array(answer.gradient),
+        )
+
+    def _as_tensor(self, image: NDArray[np.uint8]) -> Tensor:
+        batch = torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1)[None]
+        return batch.to(self._device).float() / 255
+
+
+Head = TypeVar("Head", ConfNet, GradNet)
+
+
+def _matching(run: Path, task: str, stored: StoredNetwork[Head], regressor_sha256: str) -> Head:
+    if stored.regressor_sha256 != regressor_sha256:
+        raise TrainingError(
+            f"{run}: its {task} was trained on another regressor than the folder's; train it again"
+        )
+    return stored.network
+
+
+def _as_array(maps: Tensor) -> NDArray[np.float32]:
+    return np.ascontiguousarray(maps[0].permute(1, 2, 0).cpu().numpy())

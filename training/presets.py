@@ -1,0 +1,248 @@
+"""All numbers of all training runs, in one place.
+
+`full` is the published training: METHOD's DispNetCorr1D, ConfNet and GradNet. `small` (about 2.7 million
+parameters, a 11 MB file) and `tiny` (for minutes on a laptop's CPU) change what short runs on few pairs need
+changed, all of it here: BatchNorm, a one-sided correlation, predictions in units of 16 px, a larger learning rate
+with warm-up and a cosine end, gradient clipping, a compressed loss schedule, milder colour changes, flips, and heads
+that work at the features' half resolution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from training.augmentation import AugmentationConfig
+from training.errors import TrainingError
+from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
+
+Task = Literal["regressor", "regressor_f", "confnet", "gradnet"]
+TASKS: tuple[Task, ...] = ("regressor", "regressor_f", "confnet", "gradnet")
+
+
+@dataclass(frozen=True)
+class OptimizerConfig:
+    """Adam and its learning rate's course. Steps are those of the preset; a run of another length scales them."""
+
+    learning_rate: float = 1e-4
+    schedule: Literal["halving", "cosine"] = "halving"
+    """`halving` halves the rate at each of `halve_at`; `cosine` brings it to zero at the end."""
+    halve_at: tuple[int, ...] = ()
+    warmup_steps: int = 0
+    """The rate grows linearly over these."""
+    betas: tuple[float, float] = (0.9, 0.999)
+    epsilon: float = 1e-4
+    weight_decay: float = 0.0
+    """L2 penalty: of the contracting part's convolution weights in a regressor, of all weights in a head."""
+    clip_norm: float | None = None
+    """Largest norm of the gradient; None does not clip."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preset:
+    """What every training run has."""
+
+    steps: int
+    """Optimizer steps."""
+    batch_size: int
+    """Crops a step (and a process)."""
+    crop_width: int
+    crop_height: int
+    """Size of the crops in pixels, multiples of 64."""
+    optimizer: OptimizerConfig
+    augmentation: AugmentationConfig = field(default_factory=AugmentationConfig)
+    validation_interval: int = 1000
+    """Steps between validations, each of which writes a checkpoint."""
+    validation_samples: int = 50
+    """Validation frames looked at, evenly spread over the split."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegressorPreset(Preset):
+    """DispNetCorr1D from scratch."""
+
+    network: DispNetConfig = field(default_factory=DispNetConfig)
+    stage_ends: tuple[int, ...] = (0, 0, 0, 0, 0, 0)
+    """Step at which each stage of the loss weights but the last ends."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FineTuningPreset(Preset):
+    """`regressor_f`: a trained regressor tuned with eq. 9; the network is the regressor's.
+
+    No zoom: eq. 9 takes differences of the truth, which nearest sampling would turn into stairs.
+    """
+
+    gradient_weight: float = 5.0
+    """Lambda of eq. 9."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConfNetPreset(Preset):
+    """ConfNet on a frozen regressor."""
+
+    network: HeadConfig = field(default_factory=HeadConfig)
+    """The feature channels are taken from the regressor."""
+    correct_within_px: float = 1.0
+    """t: a disparity this close to the truth is correct. The paper does not give it; 3 is KITTI's convention."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GradNetPreset(Preset):
+    """GradNet on a frozen regressor."""
+
+    network: HeadConfig = field(default_factory=lambda: PUBLISHED_GRADNET)
+    gradient_threshold_px: float = 1.0
+    """Larger forward differences are discontinuities and masked out. One digit in the paper, most likely 1."""
+
+
+def _every(interval: int, end: int) -> tuple[int, ...]:
+    return tuple(range(interval, end, interval))
+
+
+SMALL_AUGMENTATION = AugmentationConfig(
+    log_zoom=(-0.1, 0.3),
+    log_squeeze=(-0.1, 0.1),
+    horizontal_flip=0.5,
+    log_brightness=0.2,
+    log_gamma=0.2,
+    log_contrast=0.2,
+    log_color=0.1,
+    noise=0.02,
+)
+"""About half of the released ranges: a small network in a short run fits narrower data better (ours)."""
+
+SMALL_OPTIMIZER = OptimizerConfig(
+    learning_rate=1e-3, schedule="cosine", warmup_steps=500, epsilon=1e-8, weight_decay=1e-4, clip_norm=1.0
+)
+
+FULL_REGRESSOR = RegressorPreset(
+    steps=1_200_000,
+    batch_size=4,
+    crop_width=768,
+    crop_height=384,
+    optimizer=OptimizerConfig(halve_at=(200_000, 350_000, 500_000, 650_000, 800_000), weight_decay=4e-4),
+    stage_ends=(100_000, 200_000, 300_000, 400_000, 500_000, 600_000),
+    validation_interval=10_000,
+)
+"""The stage lengths are not published; 100,000 steps each is what a public retraining used (ours)."""
+
+SMALL_REGRESSOR = RegressorPreset(
+    steps=20_000,
+    batch_size=4,
+    crop_width=320,
+    crop_height=128,
+    optimizer=SMALL_OPTIMIZER,
+    augmentation=SMALL_AUGMENTATION,
+    network=DispNetConfig(width=0.25, one_sided=True, normalization="batch", prediction_scale=16.0),
+    stage_ends=(500, 1000, 2000, 3000, 5000, 8000),
+    validation_interval=500,
+)
+TINY_REGRESSOR = replace(
+    SMALL_REGRESSOR,
+    steps=800,
+    optimizer=replace(SMALL_OPTIMIZER, warmup_steps=40),
+    stage_ends=(30, 60, 120, 200, 300, 400),
+    validation_interval=200,
+    validation_samples=16,
+)
+
+FULL_FINE_TUNING = FineTuningPreset(
+    steps=100_000,
+    batch_size=4,
+    crop_width=768,
+    crop_height=384,
+    optimizer=OptimizerConfig(learning_rate=1e-5, weight_decay=4e-4),
+    augmentation=AugmentationConfig(log_zoom=(0.0, 0.0), log_squeeze=(0.0, 0.0)),
+    validation_interval=5000,
+)
+"""Length and learning rate of the fine-tuning are not published (ours)."""
+SMALL_FINE_TUNING = FineTuningPreset(
+    steps=3000,
+    batch_size=4,
+    crop_width=320,
+    crop_height=128,
+    optimizer=replace(SMALL_OPTIMIZER, learning_rate=1e-4, warmup_steps=100),
+    augmentation=replace(SMALL_AUGMENTATION, log_zoom=(0.0, 0.0), log_squeeze=(0.0, 0.0)),
+    validation_interval=500,
+)
+TINY_FINE_TUNING = replace(
+    SMALL_FINE_TUNING,
+    steps=200,
+    optimizer=replace(SMALL_OPTIMIZER, learning_rate=1e-4, warmup_steps=20),
+    validation_interval=100,
+    validation_samples=16,
+)
+
+FULL_CONFNET = ConfNetPreset(
+    steps=320_000,
+    batch_size=4,
+    crop_width=768,
+    crop_height=384,
+    optimizer=OptimizerConfig(
+        learning_rate=1e-3, halve_at=_every(40_000, 320_000), weight_decay=5e-4, epsilon=1e-8
+    ),
+    validation_interval=10_000,
+)
+SMALL_CONFNET = ConfNetPreset(
+    steps=5000,
+    batch_size=4,
+    crop_width=320,
+    crop_height=128,
+    optimizer=replace(SMALL_OPTIMIZER, warmup_steps=100),
+    augmentation=SMALL_AUGMENTATION,
+    network=HeadConfig(width=32, hidden=64, dropout=0.2, normalization="batch", half_resolution=True),
+    validation_interval=500,
+)
+TINY_CONFNET = replace(
+    SMALL_CONFNET,
+    steps=200,
+    optimizer=replace(SMALL_OPTIMIZER, warmup_steps=20),
+    validation_interval=100,
+    validation_samples=16,
+)
+
+FULL_GRADNET = GradNetPreset(
+    steps=200_000,
+    batch_size=4,
+    crop_width=768,
+    crop_height=384,
+    optimizer=OptimizerConfig(
+        learning_rate=1e-4, halve_at=_every(20_000, 200_000), weight_decay=4e-4, epsilon=1e-8
+    ),
+    validation_interval=10_000,
+)
+SMALL_GRADNET = GradNetPreset(
+    steps=5000,
+    batch_size=4,
+    crop_width=320,
+    crop_height=128,
+    optimizer=replace(SMALL_OPTIMIZER, warmup_steps=100),
+    augmentation=SMALL_AUGMENTATION,
+    network=HeadConfig(width=32, hidden=64, dropout=0.0, normalization="batch", half_resolution=True),
+    validation_interval=500,
+)
+TINY_GRADNET = replace(
+    SMALL_GRADNET,
+    steps=200,
+    optimizer=replace(SMALL_OPTIMIZER, warmup_steps=20),
+    validation_interval=100,
+    validation_samples=16,
+)
+
+PRESETS: dict[Task, dict[str, Preset]] = {
+    "regressor": {"tiny": TINY_REGRESSOR, "small": SMALL_REGRESSOR, "full": FULL_REGRESSOR},
+    "regressor_f": {"tiny": TINY_FINE_TUNING, "small": SMALL_FINE_TUNING, "full": FULL_FINE_TUNING},
+    "confnet": {"tiny": TINY_CONFNET, "small": SMALL_CONFNET, "full": FULL_CONFNET},
+    "gradnet": {"tiny": TINY_GRADNET, "small": SMALL_GRADNET, "full": FULL_GRADNET},
+}
+
+
+def find_preset(task: str, name: str) -> Preset:
+    """The preset of a task by its name. Raises TrainingError, listing what there is."""
+    for known, presets in PRESETS.items():
+        if known == task:
+            if name not in presets:
+                raise TrainingError(f"{task} has no preset {name!r}; there are {', '.join(presets)}")
+            return presets[name]
+    raise TrainingError(f"there is no task {task!r}; there are {', '.join(TASKS)}")

@@ -1,0 +1,7 @@
+"""The Lightning modules, one a task."""
+
+from training.tasks.base import StereoTask
+from training.tasks.heads import ConfNetTask, GradNetTask
+from training.tasks.regressor import FineTuningTask, RegressorTask
+
+__all__ = ["ConfNetTask", "FineTuningTask", "GradNetTask", "RegressorTask", "StereoTask"]

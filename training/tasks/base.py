@@ -1,0 +1,119 @@
+"""What all training tasks share: optimizer and schedule, the step's own randomness, the alarm on NaN."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Iterable
+from typing import Any, ClassVar
+
+import numpy as np
+import pytorch_lightning as pl
+import torch
+from torch import Tensor, nn
+
+from training.data import Batch
+from training.errors import TrainingError
+from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.presets import OptimizerConfig, Preset
+from viewing import Picture
+
+PANELS = 3
+"""Validation frames shown in TensorBoard."""
+
+
+def learning_rate_factor(config: OptimizerConfig, step: int, steps: int, preset_steps: int) -> float:
+    """The learning rate at a step of a run of `steps`, relative to the configured one."""
+    position = step * preset_steps / steps
+    if config.schedule == "halving":
+        factor = 0.5 ** sum(position >= halving for halving in config.halve_at)
+    else:
+        factor = 0.5 * (1 + math.cos(math.pi * min(position / preset_steps, 1.0)))
+    if position < config.warmup_steps:
+        factor *= (position + preset_steps / steps) / (config.warmup_steps + preset_steps / steps)
+    return factor
+
+
+class StereoTask(pl.LightningModule):
+    """One network in training."""
+
+    monitor: ClassVar[str]
+    """The validation figure whose least value marks the best weights."""
+    network: DispNetCorr1D | ConfNet | GradNet
+
+    def __init__(self, preset: Preset, steps: int, seed: int) -> None:
+        super().__init__()
+        self.preset = preset
+        self.steps = steps
+        self.seed = seed
+
+    @abstractmethod
+    def loss(self, batch: Batch) -> Tensor:
+        """The loss of a batch of crops."""
+
+    @abstractmethod
+    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+        """Figures of one whole frame, and the maps its panel shows."""
+
+    @abstractmethod
+    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
+        """The picture of a validation frame."""
+
+    def decayed_parameters(self) -> Iterable[nn.Parameter]:
+        """Parameters with weight decay: all that are trained, unless a task knows better."""
+        return (p for p in self.network.parameters() if p.requires_grad)
+
+    def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:  # noqa: ARG002
+        # Dropout draws from torch's global generator; a state that follows from the step makes an interrupted
+        # run continue as if it had not been. `train` guards the caller's own state.
+        entropy = np.random.SeedSequence([self.seed, 3, self.global_step, self.global_rank])
+        torch.manual_seed(int(entropy.generate_state(1, np.uint64)[0]))
+
+    def training_step(self, batch: Batch, batch_idx: int) -> Tensor:  # noqa: ARG002
+        loss = self.loss(batch)
+        if not torch.isfinite(loss):
+            raise TrainingError(
+                f"the loss of step {self.global_step} is {loss.item()}, so training stopped; the last checkpoint "
+                f"is whole, and a smaller learning rate or gradient clipping usually helps"
+            )
+        self.log("train/loss", loss.detach(), batch_size=len(batch["left"]))
+        self.log("train/learning_rate", self.optimizers().param_groups[0]["lr"])
+        return loss
+
+    def validation_step(self, batch: Batch, batch_idx: int) -> None:
+        figures, maps = self.validate_frame(batch)
+        for name, value in figures.items():
+            self.log(f"validation/{name}", value, batch_size=1, on_step=False, on_epoch=True, sync_dist=True)
+        if batch_idx < PANELS and self.logger is not None and self.trainer.is_global_zero:
+            picture = self.panel(batch, maps)
+            self.logger.experiment.add_image(
+                f"frame{batch_idx}", picture, self.global_step, dataformats="HWC"
+            )
+
+    def configure_optimizers(self) -> Any:
+        config = self.preset.optimizer
+        decayed = list(self.decayed_parameters())
+        known = {id(p) for p in decayed}
+        free = [p for p in self.network.parameters() if p.requires_grad and id(p) not in known]
+        optimizer = torch.optim.Adam(
+            [{"params": decayed, "weight_decay": config.weight_decay}, {"params": free, "weight_decay": 0.0}],
+            lr=config.learning_rate,
+            betas=config.betas,
+            eps=config.epsilon,
+        )
+        scheduler = torch.optim.lr_scheduler.LambdaLR(
+            optimizer, lambda step: learning_rate_factor(config, step, self.steps, self.preset.steps)
+        )
+        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": scheduler, "interval": "step"}}
+
+
+def image_of(views: Tensor) -> Picture:
+    """The first of a batch of images (B, 3, H, W) in 0..1 as (H, W, 3) uint8."""
+    picture: Picture = (views[0].clamp(0, 1) * 255).round().byte().permute(1, 2, 0).cpu().numpy()
+    return picture
+
+
+def map_of(maps: Tensor) -> Any:
+    """The first of a batch of maps, (H, W) of one channel or (H, W, C), for `viewing`."""
+    array = maps[0].float().cpu().numpy()
+    return array[0] if len(array) == 1 else array.transpose(1, 2, 0)

@@ -1,0 +1,80 @@
+"""Training DispNetCorr1D: from scratch on the scales' schedule, and fine-tuning with eq. 9."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import torch
+from torch import Tensor, nn
+
+from training.data import Batch
+from training.inference import estimate
+from training.losses import gradient_aware_l1, multiscale_l1, stage_weights
+from training.metrics import bad_rate, end_point_error, forward_differences, gradient_error
+from training.networks import DispNetCorr1D, full_resolution
+from training.presets import FineTuningPreset, RegressorPreset
+from training.tasks.base import StereoTask, image_of, map_of
+from viewing import Picture, disparity_picture, error_picture, side_by_side
+
+SMOOTH_BELOW_PX = 1.0
+"""Gradient errors are reported where the true forward differences stay below this."""
+
+
+class _DisparityTask(StereoTask):
+    monitor = "validation/epe"
+    network: DispNetCorr1D
+
+    def decayed_parameters(self) -> Iterable[nn.Parameter]:
+        return self.network.contracting_weights()
+
+    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+        disparity = estimate(self.network, None, None, batch["left"], batch["right"]).disparity
+        truth = batch["disparity"]
+        figures = {
+            "epe": end_point_error(disparity, truth),
+            "bad1": bad_rate(disparity, truth, 1.0),
+            "bad3": bad_rate(disparity, truth, 3.0),
+            "gradient": gradient_error(forward_differences(disparity), batch["gradient"], SMOOTH_BELOW_PX),
+        }
+        return figures, {"disparity": disparity}
+
+    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
+        truth, disparity = map_of(batch["disparity"]), map_of(maps["disparity"])
+        nearest = float(torch.nan_to_num(batch["disparity"]).max())
+        return side_by_side(
+            [
+                image_of(batch["left"]),
+                disparity_picture(truth, max(nearest, 1.0)),
+                disparity_picture(disparity, max(nearest, 1.0)),
+                error_picture(disparity - truth, 1.0),
+            ]
+        )
+
+
+class RegressorTask(_DisparityTask):
+    """Multi-scale L1 whose weights move from coarse to fine (Mayer et al. 2016)."""
+
+    def __init__(self, preset: RegressorPreset, network: DispNetCorr1D, steps: int, seed: int) -> None:
+        super().__init__(preset, steps, seed)
+        self.network = network
+        self.stage_ends = [round(end * steps / preset.steps) for end in preset.stage_ends]
+
+    def loss(self, batch: Batch) -> Tensor:
+        predictions = self.network(batch["left"], batch["right"]).disparities
+        return multiscale_l1(
+            predictions, batch["disparity"], stage_weights(self.global_step, self.stage_ends)
+        )
+
+
+class FineTuningTask(_DisparityTask):
+    """`regressor_f`: eq. 9 on the final disparity at full resolution."""
+
+    def __init__(self, preset: FineTuningPreset, network: DispNetCorr1D, steps: int, seed: int) -> None:
+        super().__init__(preset, steps, seed)
+        self.network = network
+        self.gradient_weight = preset.gradient_weight
+
+    def loss(self, batch: Batch) -> Tensor:
+        finest = self.network(batch["left"], batch["right"]).disparities[-1]
+        prediction = full_resolution(finest, batch["left"].shape[-2:])
+        return gradient_aware_l1(prediction, batch["disparity"], self.gradient_weight)

@@ -1,0 +1,168 @@
+"""Trained networks on disk: `<run>/<task>.safetensors` and `<run>/<task>.json`.
+
+Reading them runs no code: safetensors hold numbers only, and the JSON is structured into typed records. The JSON
+carries the digest of the tensors' file, so a damaged or mixed-up pair is refused.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import cattrs
+import safetensors.torch
+from safetensors import SafetensorError
+from torch import nn
+
+from training.errors import TrainingError
+from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
+from viewing import write_atomically
+
+Network = TypeVar("Network", bound=nn.Module)
+FORMAT = 1
+_CONVERTER = cattrs.Converter(forbid_extra_keys=True)
+
+
+@dataclass(frozen=True)
+class TrainingSummary:
+    """How a network came about."""
+
+    preset: str
+    steps: int
+    """Of the whole run."""
+    seed: int
+    data: tuple[tuple[str, float], ...]
+    """Folder and weight of each data set."""
+    best_step: int
+    """Steps done when these weights were taken."""
+    validation: dict[str, float] = field(default_factory=dict)
+    """Figures of these weights on the validation frames; empty where there were none."""
+
+
+@dataclass(frozen=True)
+class StoredNetwork(Generic[Network]):
+    """A network read from a run folder."""
+
+    network: Network
+    """In evaluation mode, on the CPU."""
+    sha256: str
+    """Digest of the tensors' file."""
+    regressor_sha256: str | None
+    """Digest of the regressor that a ConfNet or GradNet was trained on."""
+    training: TrainingSummary
+
+
+def weights_path(run: Path, task: str) -> Path:
+    return run / f"{task}.safetensors"
+
+
+def save_weights(
+    run: Path,
+    task: str,
+    network: DispNetCorr1D | ConfNet | GradNet,
+    training: TrainingSummary,
+    regressor_sha256: str | None = None,
+) -> None:
+    """Write a network, each file at once or not at all."""
+    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
+    content = safetensors.torch.save(tensors)
+    description = {
+        "format": FORMAT,
+        "task": task,
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "regressor_sha256": regressor_sha256,
+        "network": asdict(network.config),
+        "training": asdict(training),
+    }
+    write_atomically(weights_path(run, task), content)
+    write_atomically(run / f"{task}.json", json.dumps(description, indent=2) + "\n")
+
+
+def load_regressor(run: Path, task: str = "regressor") -> StoredNetwork[DispNetCorr1D]:
+    """Read `regressor` or `regressor_f` of a run folder. Raises TrainingError, naming what is wrong."""
+    return _load(run, task, lambda config: DispNetCorr1D(_structure(config, DispNetConfig)))
+
+
+def load_confnet(run: Path) -> StoredNetwork[ConfNet]:
+    """Read the ConfNet of a run folder. Raises TrainingError, naming what is wrong."""
+    return _load(run, "confnet", lambda config: ConfNet(_structure(config, HeadConfig)))
+
+
+def load_gradnet(run: Path) -> StoredNetwork[GradNet]:
+    """Read the GradNet of a run folder. Raises TrainingError, naming what is wrong."""
+    return _load(run, "gradnet", lambda config: GradNet(_structure(config, HeadConfig)))
+
+
+def read_summary(run: Path, task: str) -> TrainingSummary:
+    """How the network of a run folder came about. Raises TrainingError, naming what is wrong."""
+    path = run / f"{task}.json"
+    try:
+        summary: TrainingSummary = _structure(_read_description(path, task)["training"], TrainingSummary)
+    except ValueError as error:
+        raise TrainingError(f"{path}: does not describe a trained network ({error})") from error
+    return summary
+
+
+def copy_weights(source: Path, target: Path, task: str) -> None:
+    """Copy a network, intact, from one run folder to another."""
+    load_regressor(source, task)
+    for path in (weights_path(source, task), source / f"{task}.json"):
+        write_atomically(target / path.name, path.read_bytes())
+
+
+def has_weights(run: Path, task: str) -> bool:
+    return weights_path(run, task).exists()
+
+
+def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -> StoredNetwork[Network]:
+    path, description_path = weights_path(run, task), run / f"{task}.json"
+    if not run.is_dir():
+        raise TrainingError(f"{run}: there is no such run folder")
+    for needed in (path, description_path):
+        if not needed.is_file():
+            raise TrainingError(f"{needed}: missing, so {run} holds no trained {task}")
+    description = _read_description(description_path, task)
+    content = path.read_bytes()
+    digest = hashlib.sha256(content).hexdigest()
+    if digest != description["sha256"]:
+        raise TrainingError(f"{path}: damaged, or of another run than {description_path.name} beside it")
+    try:
+        network = build(description["network"])
+        network.load_state_dict(safetensors.torch.load(content))
+        training = _structure(description["training"], TrainingSummary)
+    except (SafetensorError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        raise TrainingError(
+            f"{path}: does not hold the {task} that {description_path.name} describes ({_first_line(error)})"
+        ) from error
+    network.eval()
+    return StoredNetwork(network, digest, description["regressor_sha256"], training)
+
+
+def _read_description(path: Path, task: str) -> dict[str, Any]:
+    try:
+        description = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise TrainingError(f"{path}: cannot be read as JSON ({error})") from error
+    keys = {"format", "task", "sha256", "regressor_sha256", "network", "training"}
+    if not isinstance(description, dict) or description.keys() != keys:
+        raise TrainingError(f"{path}: does not describe a trained network")
+    if description["format"] != FORMAT:
+        raise TrainingError(f"{path}: has format {description['format']}, this version reads {FORMAT}")
+    if description["task"] != task:
+        raise TrainingError(f"{path}: describes a {description['task']}, not a {task}")
+    return description
+
+
+def _structure(values: Any, kind: type[Any]) -> Any:
+    try:
+        return _CONVERTER.structure(values, kind)
+    except (cattrs.BaseValidationError, cattrs.StructureHandlerNotFoundError) as error:
+        raise ValueError("; ".join(cattrs.transform_error(error))) from error
+
+
+def _first_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]
