@@ -9,9 +9,7 @@ from scenes.discovery import modules_in
 from scenes.family import Family, FamilyConfig
 from scenes.spec import Scene
 
-FAMILIES: dict[str, Family] = {
-    module.FAMILY.name: module.FAMILY for module in modules_in(scenes.families)
-}
+FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in modules_in(scenes.families)}
 
 
 def sample_scene(rng: np.random.Generator, family: str, config: FamilyConfig | None = None) -> Scene:

@@ -74,7 +74,7 @@ def from_plain(data: Any, kind: type[T]) -> T:
         return _converter.structure(data, kind)
     except ClassValidationError as error:
         raise ValueError("; ".join(transform_error(error, path=kind.__name__))) from error
-    except (TypeError, KeyError) as error:
+    except (TypeError, KeyError, AttributeError) as error:
         raise ValueError(f"{kind.__name__}: {error}") from error
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,9 @@ IDENTITY_ROTATION: Quaternion = (1.0, 0.0, 0.0, 0.0)
 class Shape(ABC):
     """Parameters of one solid; subclasses in `scenes.shapes` each know one way to build a mesh."""
 
+    popularity: ClassVar[float] = 1.0
+    """How often samplers that take any shape draw this kind, relative to the others; 0 for never."""
+
     @classmethod
     @abstractmethod
     def sample(cls, rng: np.random.Generator) -> Self:
@@ -51,6 +54,9 @@ class Shape(ABC):
 @dataclass(frozen=True)
 class Texture(ABC):
     """Parameters of one image texture; subclasses in `scenes.textures` each know one way to paint it."""
+
+    popularity: ClassVar[float] = 1.0
+    """How often samplers that take any texture draw this kind, relative to the others; 0 for never."""
 
     @classmethod
     @abstractmethod

@@ -1,0 +1,313 @@
+"""Things flying in front of a cluttered landscape: the recipe of FlyingThings3D (Mayer et al. 2016).
+
+A large textured ground, static objects standing about on it, and in front of them objects that fly on smooth
+paths, all seen by a moving stereo camera. Every length scales with the nearest allowed depth, so the images
+of a rig with a small baseline look like those of one with a large baseline.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from scenes.drawing import Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.family import Family, FamilyConfig
+from scenes.lights import sample_area_light, sample_sun
+from scenes.materials import sample_material
+from scenes.motion import exposure_times, quaternion, shifted, vector, wander
+from scenes.shapes import SHAPES
+from scenes.shapes.organic import Terrain
+from scenes.spec import (
+    AreaLight,
+    Light,
+    Material,
+    Scene,
+    SceneObject,
+    Shape,
+    StereoCamera,
+    SunLight,
+    Trajectory,
+    World,
+)
+from scenes.textures.sky import Sky
+
+Count = tuple[int, int]
+"""Smallest and largest number, both included."""
+
+_SHAPE_FILL = 1.4
+"""Mean projected area of the shapes, in squares of their half extent; measured over all generators."""
+_REACH = 1.35
+"""Distance from a shape's centre to its farthest point that only elongated diagonal shapes exceed."""
+
+
+@dataclass(frozen=True)
+class FlyingThingsConfig(FamilyConfig):
+    """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+
+    flying_objects: Count = (5, 20)
+    """Objects in flight per scene."""
+    background_objects: Count = (60, 200)
+    """Static objects on the ground per scene."""
+    background_materials: Count = (8, 16)
+    """Different materials the background objects of a scene share; every flying object has its own."""
+    focal_mm: Range = (35.0, 35.0)
+    """Focal length on a sensor 32 mm wide."""
+    baseline_m: Range = (1.0, 1.0)
+    """Distance between the eyes."""
+    disparity_share: Range = (0.002, 0.167)
+    """Disparity of the farthest and the nearest surface, as a share of the image width: 2 to 160 px at 960."""
+    background_disparity_share: Range = (0.005, 0.04)
+    """Where the background objects stand, as a share of the image width."""
+    flying_cover: Range = (0.4, 0.65)
+    """Share of the image the flying objects would cover if they were placed independently."""
+    flying_speed: Range = (0.0, 0.03)
+    """Speed of a flying object, as a share of its depth per frame (0.03 is about 30 px per frame at 960)."""
+    flying_turn_deg: Range = (0.0, 8.0)
+    """How fast a flying object turns, degrees per frame."""
+    camera_speed: Range = (0.0, 0.03)
+    """Speed of the camera, as a share of the nearest depth per frame."""
+    camera_turn_deg: Range = (0.0, 0.6)
+    """How fast the camera turns, degrees per frame."""
+    pitch_deg: Range = (-3.0, 8.0)
+    """How far the camera looks down."""
+    roll_deg: Range = (-4.0, 4.0)
+    """How far the camera leans."""
+    suns: Count = (1, 2)
+    area_lights: Count = (0, 4)
+    sky_strength: Range = (0.4, 1.1)
+    """Brightness of the sky's light."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if isinstance(value, tuple) and value[0] > value[1]:
+                raise ValueError(f"flying_things: {name} must be (low, high), got {value}")
+        for name in ("focal_mm", "baseline_m", "disparity_share", "background_disparity_share"):
+            if getattr(self, name)[0] <= 0:
+                raise ValueError(f"flying_things: {name} must be above 0, got {getattr(self, name)}")
+        if self.frames < 1:
+            raise ValueError(f"flying_things: frames must be at least 1, got {self.frames}")
+
+
+@dataclass(frozen=True)
+class _Rig:
+    """The camera and what placing things in its view needs."""
+
+    camera: StereoCamera
+    config: FlyingThingsConfig
+    pose: NDArray[np.float64]
+    """Left eye to world, half way through the scene."""
+
+    def depth(self, disparity_share: float) -> float:
+        """Depth in metres at which the disparity is this share of the image width."""
+        return self.camera.disparity_metres / (disparity_share * self.camera.width)
+
+    @property
+    def nearest_m(self) -> float:
+        return self.depth(self.config.disparity_share[1])
+
+    @property
+    def farthest_m(self) -> float:
+        return self.depth(self.config.disparity_share[0])
+
+    @property
+    def half_view(self) -> tuple[float, float]:
+        """Tangents of half the horizontal and half the vertical field of view."""
+        return tuple(  # type: ignore[return-value]
+            side / 2 / self.camera.focal_px for side in (self.camera.width, self.camera.height)
+        )
+
+    def point(self, right: float, up: float, depth_m: float) -> NDArray[np.float64]:
+        """World point at an image position (-1..1 is the frame, seen from between the eyes) and depth."""
+        across, high = self.half_view
+        local = (right * across * depth_m + self.camera.baseline_m / 2, up * high * depth_m, -depth_m)
+        world: NDArray[np.float64] = self.pose[:3, :3] @ local + self.pose[:3, 3]
+        return world
+
+
+def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -> Scene:
+    """Draw one scene."""
+    rig = _sample_rig(rng, config)
+    materials: list[Material] = []
+    ground, terrain = _ground(rng, rig, materials)
+    background = _background(rng, rig, terrain, ground.motion, materials)
+    flyers = _flyers(rng, rig, terrain, ground.motion, materials)
+    return Scene(
+        family="flying_things",
+        frames=config.frames,
+        camera=rig.camera,
+        objects=(ground, *background, *flyers),
+        materials=tuple(materials),
+        lights=_lights(rng, rig),
+        world=World(Sky.sample(rng, 1024), uniform(rng, *config.sky_strength)),
+        exposure_key=uniform(rng, 0.15, 0.26),
+        notes={"flying_objects": len(flyers), "background_objects": len(background)},
+    )
+
+
+def _sample_rig(rng: np.random.Generator, config: FlyingThingsConfig) -> _Rig:
+    focal_mm, baseline_m = uniform(rng, *config.focal_mm), uniform(rng, *config.baseline_m)
+    pitch, roll = uniform(rng, *config.pitch_deg), uniform(rng, *config.roll_deg)
+    # At a pitch of -90 degrees a camera looks straight down at -z; raised by 90 it looks along +y.
+    attitude = Rotation.from_euler("XZ", (90.0 - pitch, roll), degrees=True)
+    still = StereoCamera(config.width, config.height, focal_mm, baseline_m, Trajectory.static())
+    nearest_m = still.disparity_metres / (config.disparity_share[1] * config.width)
+    motion = wander(
+        rng,
+        config.frames,
+        np.zeros(3),
+        attitude,
+        speed_m=uniform(rng, *config.camera_speed) * nearest_m,
+        turn_deg=uniform(rng, *config.camera_turn_deg),
+        reach_m=0.25 * nearest_m,
+        reach_deg=4.0,
+    )
+    camera = StereoCamera(config.width, config.height, focal_mm, baseline_m, motion)
+    return _Rig(camera, config, camera.pose("left", (config.frames - 1) / 2))
+
+
+def _ground(rng: np.random.Generator, rig: _Rig, materials: list[Material]) -> tuple[SceneObject, Terrain]:
+    """Gently rolling land, below everything the lower edge of the image may show nearer than allowed."""
+    half_m = rig.farthest_m
+    terrain = Terrain(
+        relief=uniform(rng, 0.0005, 0.006),
+        frequency=uniform(rng, 4.0, 9.0),
+        slope=uniform(rng, 0.8, 1.6),
+        depth=0.01,
+        cells=64,
+        concentration=2.0,
+        seed=new_seed(rng),
+    )
+    # A ray through the image's lower edge drops by this much for every metre of depth.
+    drop = -(rig.point(0.0, -1.0, 1.0) - rig.pose[:3, 3])[2]
+    angle = np.linspace(0.0, 2 * np.pi, 24)
+    circle = np.stack([np.cos(angle), np.sin(angle)], -1)
+    around = np.concatenate([circle * share for share in (0.3, 0.6, 1.0, 1.5)]) * rig.nearest_m / half_m
+    hump_m = float(terrain.height(around).max()) * half_m
+    below_m = rig.nearest_m * (max(drop, 0.1) * uniform(rng, 1.3, 3.5) + 0.3) + hump_m
+    near_px = rig.camera.focal_px / (3 * rig.nearest_m)
+    materials.append(sample_material(rng, half_m * near_px, 1024))
+    motion = Trajectory.static((0.0, 0.0, -below_m - terrain.middle_height() * half_m))
+    return SceneObject("ground", terrain, len(materials) - 1, motion, (half_m, half_m, half_m)), terrain
+
+
+_STANDING: dict[str, float] = {"Box": 0.3, "DeformedCylinder": 0.2, "Cylinder": 0.08}
+"""Shares of the background's plain kinds; the rest is of any kind."""
+
+
+def _sample_shape(rng: np.random.Generator, plain: dict[str, float] | None = None) -> Shape:
+    """A random shape: of the `plain` kinds with their shares, else of any kind by popularity."""
+    drawn = rng.random()
+    for name, share in (plain or {}).items():
+        drawn -= share
+        if drawn < 0:
+            return SHAPES[name].sample(rng)
+    kinds = [SHAPES[name] for name in sorted(SHAPES)]
+    return choose(rng, kinds, [kind.popularity for kind in kinds]).sample(rng)
+
+
+def _background(
+    rng: np.random.Generator, rig: _Rig, terrain: Terrain, ground: Trajectory, materials: list[Material]
+) -> list[SceneObject]:
+    """Objects standing or lying on the ground in view, near ones small, far ones up to skyline size."""
+    half_m = rig.farthest_m
+    first = len(materials)
+    typical_px = 0.08 * rig.camera.width
+    for _ in range(integer(rng, *rig.config.background_materials)):
+        materials.append(sample_material(rng, typical_px))
+    things = []
+    for index in range(integer(rng, *rig.config.background_objects)):
+        depth_m = rig.depth(uniform(rng, *rig.config.background_disparity_share))
+        spot = rig.point(uniform(rng, -1.25, 1.25), 0.0, depth_m)
+        size_m = depth_m * rig.half_view[0] * log_uniform(rng, 0.05, 0.3)
+        hill_m = float(terrain.height(spot[None, :2] / half_m)[0]) * half_m
+        land_m = ground.positions_m[0][2] + terrain.middle_height() * half_m + hill_m
+        spot[2] = land_m + size_m * uniform(rng, 0.2, 0.7)
+        upright = Rotation.from_euler("Z", uniform(rng, 0.0, 360.0), degrees=True)
+        turn = upright if chance(rng, 0.6) else Rotation.random(random_state=rng)
+        stretch = rng.uniform(0.75, 1.25, 3)
+        things.append(
+            SceneObject(
+                name=f"background {index}",
+                shape=_sample_shape(rng, _STANDING),
+                material=integer(rng, first, len(materials) - 1),
+                motion=Trajectory.static(vector(spot), quaternion(turn)),
+                scale_m=vector(size_m * stretch),
+            )
+        )
+    return things
+
+
+def _flyers(
+    rng: np.random.Generator, rig: _Rig, terrain: Terrain, ground: Trajectory, materials: list[Material]
+) -> list[SceneObject]:
+    count = integer(rng, *rig.config.flying_objects)
+    # `count` objects of this cover each leave 1 - cover of the image free, if placed independently.
+    each = 1 - (1 - uniform(rng, *rig.config.flying_cover)) ** (1 / max(count, 1))
+    floor_m = ground.positions_m[0][2] + terrain.middle_height() * rig.farthest_m
+    flyers = []
+    for index in range(count):
+        cover = min(each * math.exp(rng.normal(-0.1, 0.5)), 0.14)
+        size_px = math.sqrt(cover * rig.camera.width * rig.camera.height / _SHAPE_FILL)
+        materials.append(sample_material(rng, size_px))
+        flyers.append(_flyer(rng, rig, f"flying {index}", len(materials) - 1, size_px, floor_m))
+    return flyers
+
+
+def _flyer(
+    rng: np.random.Generator, rig: _Rig, name: str, material: int, size_px: float, floor_m: float
+) -> SceneObject:
+    """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth."""
+    config = rig.config
+    shape = _sample_shape(rng)
+    stretch = rng.uniform(0.8, 1.25, 3)
+    near_share = config.disparity_share[1]
+    depth_m = rig.depth(uniform(rng, min(0.15 * near_share, near_share), near_share))
+    relative = size_px / rig.camera.focal_px
+    # The front of a ball of radius relative * depth about the centre stays behind the nearest depth.
+    depth_m = max(depth_m, rig.nearest_m / max(1 - _REACH * relative, 0.2))
+    size_m = relative * depth_m
+    place = rig.point(uniform(rng, -0.95, 0.95), uniform(rng, -0.95, 0.95), depth_m)
+    place[2] = max(place[2], floor_m + 0.7 * size_m)
+    motion = wander(
+        rng,
+        config.frames,
+        place,
+        Rotation.random(random_state=rng),
+        speed_m=uniform(rng, *config.flying_speed) * depth_m,
+        turn_deg=uniform(rng, *config.flying_turn_deg),
+        reach_m=0.25 * depth_m,
+        reach_deg=60.0,
+    )
+    scale = size_m * stretch
+    reach_m = float(np.linalg.norm(shape.mesh().vertices * scale, axis=1).max())
+    return SceneObject(name, shape, material, _kept_away(motion, reach_m, rig), vector(scale))
+
+
+def _kept_away(motion: Trajectory, reach_m: float, rig: _Rig) -> Trajectory:
+    """The motion, moved away from the camera as far as it takes to stay behind the nearest depth."""
+    forward = -rig.pose[:3, 2]
+    shortfall = -math.inf
+    for time in exposure_times(rig.config.frames):
+        eye = rig.camera.pose("left", time)
+        depth_m = float((motion.pose(time)[:3, 3] - eye[:3, 3]) @ -eye[:3, 2])
+        shortfall = max(shortfall, (rig.nearest_m + reach_m - depth_m) / float(forward @ -eye[:3, 2]))
+    return motion if shortfall <= 0 else shifted(motion, forward * shortfall * 1.001)
+
+
+def _lights(rng: np.random.Generator, rig: _Rig) -> tuple[Light, ...]:
+    """Suns from mostly behind the camera, and coloured area lights beside and above the flying objects."""
+    suns: list[SunLight] = [sample_sun(rng, rig.pose) for _ in range(integer(rng, *rig.config.suns))]
+    lamps: list[AreaLight] = []
+    for _ in range(integer(rng, *rig.config.area_lights)):
+        target = rig.point(
+            uniform(rng, -0.7, 0.7), uniform(rng, -0.5, 0.5), rig.nearest_m * uniform(rng, 1.5, 4.0)
+        )
+        lamps.append(sample_area_light(rng, rig.pose, target, rig.nearest_m))
+    return (*suns, *lamps)
+
+
+FAMILY = Family(name="flying_things", config=FlyingThingsConfig, sample=sample_flying_things)

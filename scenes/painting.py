@@ -1,0 +1,149 @@
+"""What the texture generators share: palettes, periodic noise, colouring and film grain.
+
+Pictures are painted as float32 in 0..255 (sRGB), fields as float32 of unit variance or in 0..1; everything
+is periodic, because materials repeat their textures.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from scenes.drawing import choose
+
+Field = NDArray[np.float32]
+"""(H, W) or, with colour, (H, W, 3)."""
+Srgb = tuple[int, int, int]
+"""0..255."""
+Palette = tuple[Srgb, ...]
+
+_OKLAB_TO_LMS = np.array(
+    [
+        (1.0, 0.3963377774, 0.2158037573),
+        (1.0, -0.1055613458, -0.0638541728),
+        (1.0, -0.0894841775, -1.2914855480),
+    ]
+)
+_LMS_TO_LINEAR = np.array(
+    [
+        (4.0767416621, -3.3077115913, 0.2309699292),
+        (-1.2684380046, 2.6097574011, -0.3413193965),
+        (-0.0041960863, -0.7034186147, 1.7076147010),
+    ]
+)
+
+
+def oklch_to_srgb(
+    lightness: NDArray[np.float64], chroma: NDArray[np.float64], hue: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Perceptual lightness (0..1), chroma (0..0.3) and hue (radians), (N,) each, to (N, 3) sRGB 0..255.
+
+    B. Ottosson, "A perceptual color space for image processing", 2020. Colours outside sRGB are clipped.
+    """
+    lab = np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], -1)
+    linear = np.clip((lab @ _OKLAB_TO_LMS.T) ** 3 @ _LMS_TO_LINEAR.T, 0.0, 1.0)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    colors: NDArray[np.int64] = np.round(encoded * 255).astype(np.int64)
+    return colors
+
+
+def sample_palette(rng: np.random.Generator, count: int) -> Palette:
+    """Colours that go together, as photographs have them: dark to light, muted more often than vivid.
+
+    Hues are neighbours, opposites or free; lightness is spread evenly, so that patterns have contrast.
+    """
+    scheme = choose(rng, ["neighbours", "opposites", "free"], [0.5, 0.3, 0.2])
+    base = rng.uniform(0.0, 2 * np.pi)
+    if rng.random() < 0.3:  # skin, wood, earth, brick, sand: the commonest hues of things
+        base = rng.uniform(0.4, 1.9)
+    spread = {"neighbours": 0.35, "opposites": 0.35, "free": np.pi}[scheme]
+    hue = base + rng.uniform(-spread, spread, count)
+    if scheme == "opposites":
+        hue = hue + np.pi * (rng.random(count) < 0.4)
+    strength = choose(rng, [0.045, 0.1, 0.18], [0.35, 0.4, 0.25])
+    chroma = strength * rng.uniform(0.4, 1.3, count)
+    low = rng.uniform(0.15, 0.5)
+    high = rng.uniform(max(0.65, low + 0.3), 0.98)
+    steps = (np.arange(count) + rng.uniform(0.1, 0.9, count)) / count
+    lightness = rng.permutation(low + (high - low) * steps)
+    return tuple((int(r), int(g), int(b)) for r, g, b in oklch_to_srgb(lightness, chroma, hue))
+
+
+def unit_grid(size: int) -> tuple[Field, Field]:
+    """x to the right and y down, (size, size) each, 0..1 at pixel centres."""
+    line = (np.arange(size, dtype=np.float32) + np.float32(0.5)) / np.float32(size)
+    x, y = np.meshgrid(line, line)
+    return x, y
+
+
+def spectral_noise(
+    rng: np.random.Generator,
+    size: int | tuple[int, int],
+    slope: float,
+    low_cycles: float = 1.0,
+    high_cycles: float = np.inf,
+    stretch: tuple[float, float] = (1.0, 1.0),
+) -> Field:
+    """Periodic Gaussian noise of zero mean and unit variance with amplitude spectrum 1 / f^slope.
+
+    f is in cycles per picture between `low_cycles` and `high_cycles`. `stretch` (along x, along y) draws the
+    pattern out. Photographs have a slope of about 1 (Field 1987).
+    """
+    height, width = (size, size) if isinstance(size, int) else size
+    fy = fft.fftfreq(height, 1.0 / height).astype(np.float32)[:, None] * np.float32(stretch[1])
+    fx = fft.rfftfreq(width, 1.0 / width).astype(np.float32)[None, :] * np.float32(stretch[0])
+    squared = fx * fx + fy * fy
+    squared[0, 0] = 1.0
+    gain = squared ** np.float32(-slope / 2)
+    gain[(squared < low_cycles**2 * 0.999) | (squared > high_cycles**2)] = 0.0
+    gain[0, 0] = 0.0
+    white = rng.standard_normal((2, *gain.shape), dtype=np.float32)
+    spectrum = (white[0] + 1j * white[1]) * gain
+    noise: Field = fft.irfft2(spectrum, s=(height, width))
+    return noise / max(float(noise.std()), 1e-12)
+
+
+def to_unit(noise: Field) -> Field:
+    """Unit-variance noise to 0..1, squeezed softly at the ends."""
+    return 0.5 + 0.5 * np.tanh(np.float32(0.75) * noise)
+
+
+def colorize(value: Field, palette: Palette) -> Field:
+    """Map 0..1 onto a palette, blending neighbours: (H, W) to (H, W, 3)."""
+    stops = np.linspace(0.0, 1.0, len(palette))
+    table = np.stack(
+        [np.interp(np.linspace(0.0, 1.0, 512), stops, [color[c] for color in palette]) for c in range(3)], -1
+    ).astype(np.float32)
+    index = np.clip(value * np.float32(511) + np.float32(0.5), 0, 511).astype(np.int32)
+    return table[index]
+
+
+def flat_colors(index: NDArray[np.integer], palette: Palette) -> Field:  # type: ignore[type-arg]
+    """(H, W) indices to the palette's colours (H, W, 3)."""
+    return np.array(palette, np.float32)[index]
+
+
+def smooth_step(value: Field, edge: float, width: float) -> Field:
+    """0 below `edge`, 1 above, with a ramp of `width`: edges without stairs."""
+    t = np.clip((value - np.float32(edge)) / np.float32(width) + np.float32(0.5), 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def mix(below: Field, above: Field, cover: Field) -> Field:
+    """`above` painted over `below` (both (H, W, 3)) with an opacity (H, W)."""
+    return below + (above - below) * cover[..., None]
+
+
+def finish(picture: Field, rng: np.random.Generator, grain: float) -> NDArray[np.uint8]:
+    """Add fine detail and round to bytes.
+
+    `grain` is the standard deviation of the noise relative to the brightness: detail at the scale of one
+    and two pixels, which is what stereo matching lives on where a pattern has none.
+    """
+    height, width = picture.shape[:2]
+    fine = rng.standard_normal((height, width), dtype=np.float32)
+    coarse = fine + np.roll(fine, 1, 0) + np.roll(fine, 1, 1) + np.roll(fine, (1, 1), (0, 1))
+    noise = np.float32(0.6) * fine + np.float32(0.4) * coarse
+    grained = (picture + 12) * (1 + np.float32(grain) * noise)[..., None] - 12
+    return np.clip(grained + np.float32(0.5), 0, 255).astype(np.uint8)

@@ -1,0 +1,278 @@
+"""Pictures with figures in them: collages, blurred shapes, rows of glyphs, facades."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from scenes.drawing import chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.painting import (
+    Field,
+    Palette,
+    colorize,
+    finish,
+    flat_colors,
+    mix,
+    sample_palette,
+    smooth_step,
+    spectral_noise,
+    to_unit,
+    unit_grid,
+)
+from scenes.spec import Texture
+
+
+def stamp_shapes(
+    rng: np.random.Generator,
+    picture: Field,
+    colors: NDArray[np.float32],
+    radii: NDArray[np.float64],
+    corners: int,
+    detail: Field,
+) -> None:
+    """Paint discs (corners 0), polygons or mixtures (-1) over a periodic picture, in place.
+
+    `colors` (N, 3), `radii` (N,) in pixels. Each figure has its own squeeze, direction, gradient and piece of
+    the noise `detail`, as each leaf of a heap has.
+    """
+    size = len(picture)
+    centres = rng.integers(0, size, (len(radii), 2))
+    shifts = rng.integers(0, size, (len(radii), 2))
+    angles = rng.uniform(0.0, 2 * np.pi, len(radii))
+    squeezes = rng.uniform(0.4, 1.0, len(radii))
+    kinds = rng.choice([0, 3, 4, 4, 5, 6], len(radii)) if corners < 0 else np.full(len(radii), corners)
+    ramps = rng.normal(0.0, 0.25, len(radii))
+    for i, radius in enumerate(radii):
+        reach = int(np.ceil(radius)) + 1
+        offset = np.arange(-reach, reach + 1)
+        x, y = offset[None, :].astype(np.float32), offset[:, None].astype(np.float32)
+        cos, sin = np.float32(np.cos(angles[i])), np.float32(np.sin(angles[i]))
+        u = (cos * x + sin * y) / np.float32(radius)
+        v = (cos * y - sin * x) / np.float32(radius * squeezes[i])
+        inside = _figure(u, v, int(kinds[i])) <= 1
+        rows, columns = (centres[i, 0] + offset) % size, (centres[i, 1] + offset) % size
+        piece = detail[np.ix_((rows + shifts[i, 0]) % size, (columns + shifts[i, 1]) % size)]
+        shade = 1 + np.float32(ramps[i]) * u + piece
+        target = np.ix_(rows, columns)
+        patch = picture[target]
+        picture[target] = np.where(inside[..., None], colors[i] * shade[..., None], patch)
+
+
+def _figure(u: Field, v: Field, corners: int) -> Field:
+    """A figure's gauge: at most 1 inside a disc (corners 0) or a regular polygon of unit radius."""
+    if corners == 0:
+        return np.hypot(u, v)
+    if corners == 4:
+        return np.maximum(np.abs(u), np.abs(v)) * np.float32(np.sqrt(2.0))
+    sector = 2 * np.pi / corners
+    angle = np.arctan2(v, u) % np.float32(sector) - np.float32(sector / 2)
+    return np.hypot(u, v) * np.cos(angle) / np.float32(np.cos(sector / 2))
+
+
+@dataclass(frozen=True)
+class DeadLeaves(Texture):
+    """Figures of all sizes heaped on one another: the occlusions and scale invariance of photographs.
+
+    Lee, Mumford, Huang, "Occlusion models for natural images", 2001: radii fall as r^-3.
+    """
+
+    size: int
+    seed: int
+    palette: Palette
+    corners: int
+    """0 discs, 3.. polygons, -1 a mixture."""
+    figures: int
+    smallest: float
+    """Radius in pixels."""
+    largest: float
+    """Radius as a share of the picture."""
+    grain: float
+
+    popularity: ClassVar[float] = 2.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            palette=sample_palette(rng, integer(rng, 4, 10)),
+            corners=choose(rng, [0, 0, 4, 4, 3, -1, -1, -1]),
+            figures=integer(rng, 120, 320),
+            smallest=uniform(rng, 2.0, 6.0),
+            largest=uniform(rng, 0.12, 0.25),
+            grain=uniform(rng, 0.03, 0.12),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        low, high = self.smallest, self.largest * self.size
+        share = rng.uniform(0.0, 1.0, self.figures)
+        radii = (low**-2 + share * (high**-2 - low**-2)) ** -0.5
+        # Small figures on a heap of big ones; a heap the other way round shows only the big ones.
+        radii[: self.figures // 4] = rng.uniform(0.4 * high, high, self.figures // 4)
+        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.figures)]
+        colors *= rng.uniform(0.7, 1.25, (self.figures, 1)).astype(np.float32)
+        detail = np.float32(0.13) * spectral_noise(rng, self.size, 0.8, 4)
+        picture = np.tile(np.array(self.palette[0], np.float32), (self.size, self.size, 1))
+        stamp_shapes(rng, picture, colors, radii, self.corners, detail)
+        return finish(picture, rng, self.grain)
+
+
+@dataclass(frozen=True)
+class BlurredShapes(Texture):
+    """Bright figures out of focus, over and through each other: bokeh, stained walls, watercolour."""
+
+    size: int
+    seed: int
+    palette: Palette
+    figures: int
+    blur: float
+    """Standard deviation of the blur as a share of the picture."""
+    grain: float
+
+    popularity: ClassVar[float] = 0.7
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            palette=sample_palette(rng, integer(rng, 4, 8)),
+            figures=integer(rng, 25, 90),
+            blur=log_uniform(rng, 0.004, 0.02),
+            grain=uniform(rng, 0.05, 0.12),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        size = self.size
+        picture = np.tile(np.array(self.palette[0], np.float32), (size, size, 1))
+        radii = size * np.exp(rng.uniform(np.log(0.03), np.log(0.18), self.figures))
+        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.figures)]
+        stamp_shapes(rng, picture, colors, radii, -1, np.zeros((size, size), np.float32))
+        fy, fx = fft.fftfreq(size).astype(np.float32), fft.rfftfreq(size).astype(np.float32)
+        gain = np.exp(-2 * (np.pi * self.blur * size) ** 2 * (fx[None, :] ** 2 + fy[:, None] ** 2))
+        spectrum = fft.rfft2(picture, axes=(0, 1)) * gain.astype(np.float32)[..., None]
+        blurred: Field = fft.irfft2(spectrum, s=(size, size), axes=(0, 1))
+        blurred *= (1 + np.float32(0.1) * spectral_noise(rng, size, 0.8, 3))[..., None]
+        return finish(blurred, rng, self.grain)
+
+
+@dataclass(frozen=True)
+class GlyphRows(Texture):
+    """Lines of words in an alphabet that never was: print, signs, labels."""
+
+    size: int
+    seed: int
+    palette: Palette
+    """Paper first, then inks."""
+    lines: int
+    letters: int
+    """Places for letters in a line."""
+    alphabet: int
+    """Number of different letters."""
+    grain: float
+
+    popularity: ClassVar[float] = 0.8
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        lines = integer(rng, 4, 16)
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            palette=sample_palette(rng, integer(rng, 2, 3)),
+            lines=lines,
+            letters=round(lines * uniform(rng, 1.3, 1.8)),
+            alphabet=integer(rng, 10, 30),
+            grain=uniform(rng, 0.03, 0.1),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        glyphs = self._alphabet(rng)
+        text = rng.integers(1, self.alphabet + 1, (self.lines, self.letters))
+        text[rng.random(text.shape) < 0.17] = 0
+        inks = rng.integers(1, len(self.palette), self.lines)
+        # Letters are 5 x 7 in cells of 6 x 10.
+        x, y = unit_grid(self.size)
+        column, row = (x * (6 * self.letters)).astype(np.int32), (y * (10 * self.lines)).astype(np.int32)
+        letter = text[row // 10 % self.lines, column // 6 % self.letters]
+        on = glyphs[letter, row % 10, column % 6]
+        paper = np.array(self.palette[0], np.float32)
+        paper = paper * (1 + np.float32(0.06) * spectral_noise(rng, self.size, 1.0, 1))[..., None]
+        ink = flat_colors(inks[row // 10 % self.lines], self.palette)
+        return finish(mix(paper, ink, on * np.float32(0.92)), rng, self.grain)
+
+    def _alphabet(self, rng: np.random.Generator) -> Field:
+        """(1 + alphabet, 10, 6) pictures of letters made of a few straight strokes; the first is a space."""
+        glyphs = np.zeros((self.alphabet + 1, 10, 6), np.float32)
+        for glyph in glyphs[1:]:
+            for stroke in rng.choice(10, int(rng.integers(2, 5)), replace=False):
+                if stroke < 3:
+                    glyph[1:8, (0, 2, 4)[stroke]] = 1
+                elif stroke < 6:
+                    glyph[(1, 4, 7)[stroke - 3], :5] = 1
+                else:
+                    half = slice(0, 4) if stroke < 8 else slice(3, 7)
+                    slant = np.array([0, 1, 1, 2, 3, 3, 4])[:: 1 if stroke % 2 else -1]
+                    glyph[np.arange(1, 8)[half], slant[half]] = 1
+        return glyphs
+
+
+@dataclass(frozen=True)
+class Facade(Texture):
+    """Rows of framed windows, some lit, in a weathered wall."""
+
+    size: int
+    seed: int
+    palette: Palette
+    """Wall, frames, panes dark and light."""
+    floors: int
+    bays: int
+    window: tuple[float, float]
+    """Width and height as shares of a bay."""
+    grain: float
+
+    popularity: ClassVar[float] = 0.7
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        floors = integer(rng, 3, 10)
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            palette=sample_palette(rng, 4),
+            floors=floors,
+            bays=max(2, round(floors * uniform(rng, 0.6, 1.5))),
+            window=(uniform(rng, 0.35, 0.8), uniform(rng, 0.4, 0.8)),
+            grain=uniform(rng, 0.05, 0.14),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        x, y = unit_grid(self.size)
+        u, v = x * self.bays, y * self.floors
+        bay, floor = u.astype(np.int32) % self.bays, v.astype(np.int32) % self.floors
+        across = np.abs(u % 1 - np.float32(0.5)) / np.float32(self.window[0] / 2)
+        up = np.abs(v % 1 - np.float32(0.5)) / np.float32(self.window[1] / 2)
+        edge = np.maximum(across, up)
+        opening = (edge < 1).astype(np.float32)
+        pane = ((edge < 0.85) & (np.minimum(across, up) > 0.06)).astype(np.float32)
+        wall = np.array(self.palette[0], np.float32)
+        stains = np.clip(1 + np.float32(0.16) * spectral_noise(rng, self.size, 1.1, 1), 0.3, 1.7)[..., None]
+        lit = rng.uniform(0.0, 1.0, (self.floors, self.bays)).astype(np.float32)[floor, bay]
+        glass = colorize(np.clip(lit + np.float32(0.3) * (v % 1 - np.float32(0.5)), 0, 1), self.palette[2:])
+        reflections = np.float32(0.6) + np.float32(0.8) * to_unit(spectral_noise(rng, self.size, 1.4, 3))
+        # A darker line under each window: the sill's shadow.
+        sill = smooth_step(v % 1, 0.5 + self.window[1] / 2, 0.01) * (v % 1 < 0.56 + self.window[1] / 2)
+        wall = wall * stains * (1 - np.float32(0.4) * sill * (across < 1.1))[..., None]
+        picture = mix(wall, np.array(self.palette[1], np.float32) * stains, opening)
+        picture = mix(picture, glass * reflections[..., None], pane)
+        if chance(rng, 0.5):
+            picture[(v % 1 > 0.965)] *= np.float32(0.6)
+        return finish(picture, rng, self.grain)
