@@ -95,6 +95,12 @@ class FrameScore:
     """Sparsification of the initial disparity by each confidence measure: "confnet" and the frame's
     others."""
 
+    @property
+    def aucs(self) -> dict[str, float]:
+        """Areas under the curves, and the bounds: "random" order (on average the bad rate) and "optimal"."""
+        measured = {name: curve.auc for name, curve in self.curves.items()}
+        return {**measured, "random": self.initial_bad, "optimal": self.optimal_auc}
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -114,6 +120,8 @@ class Evaluation:
     options: EvaluationOptions
     labels: dict[str, str]
     """Method name to its name for readers, in the order of the tables."""
+    upper_bounds: frozenset[str]
+    """Methods that look at the ground truth."""
     scores: dict[str, MethodScore]
     """Pooled over all pixels of all frames on which the method ran."""
     skipped: dict[str, str]
@@ -196,6 +204,7 @@ class _Run:
         return Evaluation(
             options=self.options,
             labels={method.name: method.label for method in self.methods},
+            upper_bounds=frozenset(method.name for method in self.methods if method.upper_bound),
             scores={name: pool.score() for name, pool in self.pools.items()},
             skipped=self.skipped,
             frames=tuple(self.scores),

@@ -1,0 +1,157 @@
+"""The report's figures: panels as in the paper's Fig. 6, close-ups as in Fig. 1, curves as in Figs 4 and
+5."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from refine.evaluation import Evaluation, FrameScore, Panel
+from refine.lens import boundary_window
+from refine.metrics import SparsificationCurve, optimal_curve
+from refine.report_tables import BOUNDS, CONFIDENCE_LABELS
+from viewing import (
+    Picture,
+    confidence_picture,
+    disparity_picture,
+    enlarged,
+    error_picture,
+    shrunk,
+)
+from viewing.plots import curves
+
+PANEL_LONGEST = 960
+"""Pictures of larger frames are shrunk to this, so that a report stays a few megabytes."""
+LENS_SIZE = (64, 96)
+LENS_ZOOM = 4
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A boundary close up, every pixel enlarged."""
+
+    image: Picture
+    initial: Picture
+    refined: Picture
+    truth: Picture
+    place: str
+
+
+@dataclass(frozen=True)
+class PanelView:
+    """The pictures of one frame with their captions, ready for the page."""
+
+    name: str
+    summary: str
+    pictures: tuple[tuple[Picture, str], ...]
+    initial: Picture
+    refined: Picture
+    refined_label: str
+    lens: Lens | None
+
+
+def panel_view(evaluation: Evaluation, panel: Panel) -> PanelView:
+    """Paint one kept frame: all disparities on the scale of the ground truth."""
+    frame, refined = panel.frame, panel.disparities[evaluation.judged]
+    threshold = evaluation.options.bad_threshold
+    label = evaluation.labels[evaluation.judged]
+    largest = float(np.nanmax(frame.truth)) if np.isfinite(frame.truth).any() else float(np.nanmax(refined))
+    maximum = max(largest, 1.0)
+    initial_picture, refined_picture = (
+        shrunk(disparity_picture(values, maximum), PANEL_LONGEST) for values in (frame.disparity, refined)
+    )
+    score = evaluation.frames[panel.order]
+    pictures = [
+        (shrunk(frame.image, PANEL_LONGEST), "Left image"),
+        (initial_picture, f"Initial disparity, 0 to {maximum:.0f} px"),
+        (
+            shrunk(error_picture(_error(frame.disparity, frame.truth), threshold), PANEL_LONGEST),
+            f"Initial error: red above {threshold:g} px ({score.initial_bad * 100:.1f} %)",
+        ),
+        (refined_picture, f"Refined disparity ({label})"),
+        (
+            shrunk(error_picture(_error(refined, frame.truth), threshold), PANEL_LONGEST),
+            f"Refined error: red above {threshold:g} px "
+            f"({score.methods[evaluation.judged].regions['all'].bad * 100:.1f} %)",
+        ),
+    ]
+    if frame.confidence is not None:
+        confidence = shrunk(confidence_picture(frame.confidence), PANEL_LONGEST)
+        pictures.insert(3, (confidence, "Confidence: yellow sure, blue not"))
+    return PanelView(
+        name=frame.name,
+        summary=_summary(evaluation, score),
+        pictures=tuple(pictures),
+        initial=initial_picture,
+        refined=refined_picture,
+        refined_label=label,
+        lens=_lens(panel, refined),
+    )
+
+
+def curve_figure(measured: Mapping[str, SparsificationCurve], bad_rate: float | None, title: str) -> Figure:
+    """Sparsification curves with the random and the optimal order; the latter from `bad_rate` if not
+    given."""
+    shown = dict(measured)
+    if bad_rate is not None and not math.isnan(bad_rate):
+        shown["optimal"] = optimal_curve(bad_rate)
+    if "optimal" in shown:
+        optimal = shown.pop("optimal")
+        flat = np.full_like(optimal.bad_rate, optimal.bad_rate[0])
+        shown |= {"random": SparsificationCurve(optimal.removed, flat), "optimal": optimal}
+    series = {
+        CONFIDENCE_LABELS.get(name, name): (curve.removed * 100, curve.bad_rate * 100)
+        for name, curve in shown.items()
+    }
+    dashed = [CONFIDENCE_LABELS[name] for name in BOUNDS]
+    return curves(series, "least confident pixels removed, %", "bad pixels left, %", title, dashed)
+
+
+def auc_figure(frames: Sequence[FrameScore]) -> Figure:
+    """Area under the sparsification curve of each frame, frames sorted by their optimal area."""
+    known = sorted((f for f in frames if not math.isnan(f.optimal_auc)), key=lambda f: f.optimal_auc)
+    names = dict.fromkeys(name for frame in known for name in frame.aucs)
+    place = np.arange(1, len(known) + 1)
+    series = {
+        CONFIDENCE_LABELS.get(name, name): (place, [frame.aucs.get(name, math.nan) for frame in known])
+        for name in names
+    }
+    dashed = [CONFIDENCE_LABELS[name] for name in BOUNDS]
+    return curves(series, "frames, sorted by their optimal AUC", "AUC", "Every frame", dashed, marker="o")
+
+
+def _lens(panel: Panel, refined: NDArray[np.float32]) -> Lens | None:
+    frame = panel.frame
+    window = boundary_window(frame.disparity, frame.truth, LENS_SIZE)
+    if window is None:
+        return None
+    truth = frame.truth[window]
+    maximum = max(float(np.nanmax(truth)) * 1.1, 1.0)
+    initial_view, refined_view, truth_view = (
+        enlarged(disparity_picture(values, maximum), LENS_ZOOM)
+        for values in (frame.disparity[window], refined[window], truth)
+    )
+    rows, columns = window
+    place = f"columns {columns.start}–{columns.stop - 1}, rows {rows.start}–{rows.stop - 1}"
+    return Lens(enlarged(frame.image[window], LENS_ZOOM), initial_view, refined_view, truth_view, place)
+
+
+def _error(disparity: NDArray[np.float32], truth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """|d - d*|; an estimate that is missing counts as infinitely wrong, as it does in the bad rate."""
+    error: NDArray[np.float32] = np.abs(disparity - truth)
+    error[np.isfinite(truth) & ~np.isfinite(disparity)] = np.inf
+    return error
+
+
+def _summary(evaluation: Evaluation, score: FrameScore) -> str:
+    parts = []
+    for name, method in score.methods.items():
+        region = method.regions["all"]
+        if region.pixels:
+            parts.append(f"{evaluation.labels[name]}: {region.bad * 100:.1f} % bad, EPE {region.epe:.2f} px")
+    return "; ".join(parts)

@@ -1,0 +1,190 @@
+"""The report's tables: numbers as cells with the text to read and the full value to sort by."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from refine.evaluation import Evaluation, FrameScore, MethodScore
+from refine.paper import PAPER, PaperScore
+from refine.results import mean_aucs
+
+CONFIDENCE_LABELS = {"confnet": "ConfNet", "random": "Random order", "optimal": "Optimal order"}
+BOUNDS = ("random", "optimal")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One number: what is read and what is sorted by (the full value, as in results.csv)."""
+
+    text: str
+    value: str
+    best: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """Headings over rows; a row is a name and its cells."""
+
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, tuple[Cell, ...]], ...]
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One headline number."""
+
+    value: str
+    label: str
+
+
+def number(value: float, digits: int = 2, scale: float = 1.0, best: bool = False) -> Cell:
+    """A cell with `value * scale` rounded for reading; a dash where the value is NaN."""
+    if math.isnan(value):
+        return Cell("–", "")
+    return Cell(f"{value * scale:.{digits}f}", repr(value), best)
+
+
+def percent(value: float, best: bool = False) -> Cell:
+    return number(value, digits=2, scale=100, best=best)
+
+
+def flat(score: MethodScore) -> PaperScore:
+    """A method's pooled measures in the paper's terms."""
+    everything, occluded = score.regions["all"], score.regions["occ"]
+    return PaperScore(everything.bad, everything.epe, occluded.bad, occluded.epe, score.gradient_masked)
+
+
+def summary_tiles(evaluation: Evaluation) -> list[Tile]:
+    """The headline: what refinement changed, and how good the confidence is."""
+    tiles = []
+    start, end = evaluation.scores.get("regressor"), evaluation.scores.get("ours")
+    if start is not None and end is not None:
+        before, after = flat(start), flat(end)
+        threshold = f"{evaluation.options.bad_threshold:g}"
+        for label, old, new, scale, unit in (
+            ("end-point error, px", before.epe_all, after.epe_all, 1, ""),
+            (f"pixels off by more than {threshold} px", before.bad_all, after.bad_all, 100, " %"),
+            ("the same where occluded", before.bad_occ, after.bad_occ, 100, " %"),
+            ("gradient error", before.gradient, after.gradient, 1, ""),
+        ):
+            if not math.isnan(old):
+                digits = 1 if scale == 100 else 2
+                tiles.append(Tile(f"{old * scale:.{digits}f} → {new * scale:.{digits}f}{unit}", label))
+    aucs = mean_aucs(evaluation)
+    if "confnet" in aucs and aucs["random"] > aucs["optimal"]:
+        share = (aucs["random"] - aucs["confnet"]) / (aucs["random"] - aucs["optimal"])
+        tiles.append(
+            Tile(f"{share * 100:.0f} %", "of the way from a random to the optimal order: ConfNet's AUC")
+        )
+    return tiles
+
+
+def error_table(evaluation: Evaluation) -> Table:
+    """Pooled errors, a row a method; the best of those that do not see the ground truth in bold."""
+    threshold = f"{evaluation.options.bad_threshold:g}"
+    columns = {name: _error_values(score) for name, score in evaluation.scores.items()}
+    rivals = [values for name, values in columns.items() if name not in evaluation.upper_bounds]
+    best = [
+        min((value for value in column if not math.isnan(value)), default=math.nan) for column in zip(*rivals)
+    ]
+    rows = []
+    for name, values in columns.items():
+        rival = name not in evaluation.upper_bounds
+        scales = (100, 1, 100, 1, 1, 1)
+        cells = [
+            number(value, digits=2 if scale == 100 else 3, scale=scale, best=rival and value == lowest)
+            for value, lowest, scale in zip(values, best, scales, strict=True)
+        ]
+        rows.append((evaluation.labels[name], (*cells, number(evaluation.scores[name].seconds, digits=2))))
+    return Table(
+        (
+            "Method",
+            f"> {threshold} px, all, %",
+            "EPE, all, px",
+            f"> {threshold} px, occ., %",
+            "EPE, occ., px",
+            "gradient, smooth",
+            "gradient, all",
+            "s a frame",
+        ),
+        tuple(rows),
+    )
+
+
+def ratio_table(evaluation: Evaluation) -> Table:
+    """Each method's errors divided by the regressor's, ours and the paper's."""
+    headings = ("Errors ÷ regressor's", "bad, all", "EPE, all", "bad, occ.", "EPE, occ.", "gradient")
+    sources = {"here": {name: flat(score) for name, score in evaluation.scores.items()}}
+    sources |= {f"paper, {name}": scores for name, scores in PAPER.items()}
+    rows = []
+    for method, label in evaluation.labels.items():
+        for source, scores in sources.items():
+            if method == "regressor" or method not in scores or "regressor" not in scores:
+                continue
+            rows.append((f"{label}: {source}", _ratios(scores[method], scores["regressor"])))
+    return Table(headings, tuple(rows))
+
+
+def confidence_table(evaluation: Evaluation) -> Table:
+    """Mean area under the sparsification curve, and on how many frames each measure beats ConfNet."""
+    aucs = mean_aucs(evaluation)
+    room = aucs["random"] - aucs["optimal"]
+    rows = []
+    for name, auc in sorted(aucs.items(), key=lambda item: item[1]):
+        share = (aucs["random"] - auc) / room if room > 0 else math.nan
+        rows.append((CONFIDENCE_LABELS.get(name, name), (number(auc, 4), number(share, 1, scale=100))))
+    return Table(("Order of removal", "mean AUC", "of random → optimal, %"), tuple(rows))
+
+
+def frame_table(evaluation: Evaluation) -> Table:
+    """One row a frame: the initial and the judged method's errors, and ConfNet's area under the curve."""
+    judged = evaluation.labels[evaluation.judged].lower()
+    headings = (
+        "Frame",
+        "bad before, %",
+        f"bad {judged}, %",
+        "EPE before",
+        f"EPE {judged}",
+        "AUC",
+        "optimal AUC",
+    )
+    return Table(
+        headings, tuple((frame.name, _frame_cells(evaluation, frame)) for frame in evaluation.frames)
+    )
+
+
+def _frame_cells(evaluation: Evaluation, frame: FrameScore) -> tuple[Cell, ...]:
+    nothing = math.nan
+    before, after = frame.methods.get("regressor"), frame.methods[evaluation.judged]
+    return (
+        percent(frame.initial_bad),
+        percent(after.regions["all"].bad),
+        number(before.regions["all"].epe if before else nothing, 3),
+        number(after.regions["all"].epe, 3),
+        number(frame.aucs.get("confnet", nothing), 4),
+        number(frame.optimal_auc, 4),
+    )
+
+
+def _error_values(score: MethodScore) -> tuple[float, ...]:
+    values = flat(score)
+    return (
+        values.bad_all,
+        values.epe_all,
+        values.bad_occ,
+        values.epe_occ,
+        score.gradient_masked,
+        score.gradient_all,
+    )
+
+
+def _ratios(score: PaperScore, reference: PaperScore) -> tuple[Cell, ...]:
+    pairs = (
+        (score.bad_all, reference.bad_all),
+        (score.epe_all, reference.epe_all),
+        (score.bad_occ, reference.bad_occ),
+        (score.epe_occ, reference.epe_occ),
+        (score.gradient, reference.gradient),
+    )
+    return tuple(number(value / base if base else math.nan) for value, base in pairs)
