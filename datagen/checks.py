@@ -25,6 +25,8 @@ from datagen.raycast import Hits
 
 CONSISTENCY_TOLERANCE_PX = 0.25
 """How far a visible pixel's disparity may lie outside those of the two pixels it falls between."""
+NEARER_PX = 1e-2
+"""What hides a point has a disparity greater than the point's by more than this."""
 MAX_INCONSISTENT = 0.03
 """Share of pixels whose two views may disagree."""
 FRAME_TIE_PX = 1e-3
@@ -82,7 +84,7 @@ def check_views(
     """The two views' disparities and the labels agree, seen from `eye`.
 
     A visible point has in the other view a disparity between those of the two pixels it falls between; an
-    occluded one falls on something at least as near; one is out of the frame if its x says so.
+    occluded one falls on something nearer; one is out of the frame if its x says so.
     """
     x, low, high = _in_other_view(eye, disparity, other_disparity)
     width = disparity.shape[1]
@@ -99,9 +101,9 @@ def check_views(
         "visible pixels have another disparity than the other view has there",
     )
     yield from _too_many(
-        (high < disparity - tolerance)[occlusion == OCCLUDED],
+        (high <= disparity + NEARER_PX)[occlusion == OCCLUDED],
         MAX_INCONSISTENT,
-        "occluded pixels have nothing before them in the other view",
+        "occluded pixels have nothing nearer before them in the other view",
     )
 
 
@@ -150,7 +152,7 @@ def _in_other_view(
     width = disparity.shape[1]
     sign = -1.0 if eye == "left" else 1.0
     x = np.arange(width) + 0.5 + sign * np.nan_to_num(disparity.astype(np.float64))
-    first = np.floor(x - 0.5).astype(np.int64)
+    first = np.floor(np.clip(x - 0.5, -1, width)).astype(np.int64)
     rows = np.arange(len(disparity))[:, None]
     one = other_disparity[rows, np.clip(first, 0, width - 1)]
     two = other_disparity[rows, np.clip(first + 1, 0, width - 1)]
