@@ -141,7 +141,7 @@ class SparsificationCurve:
     removed: Floats
     """(N,) shares of the pixels removed, 0..1."""
     bad_rate: Floats
-    """(N,) bad rate of the pixels kept; at share 1 the limit, that of the most confident ones."""
+    """(N,) bad rate of the pixels kept; at share 1, where none are, that of the step before."""
 
     @property
     def auc(self) -> float:
@@ -182,17 +182,15 @@ def sparsification_curve(
     gone = np.concatenate([[0], np.cumsum(sizes)]) / error.size
     bad_gone = np.concatenate([[0], np.cumsum(bad_in_group)]) / error.size
     bad_left = bad_gone[-1] - np.interp(removed[:-1], gone, bad_gone)
-    rate = np.append(bad_left / (1 - removed[:-1]), bad_in_group[-1] / sizes[-1])
-    return SparsificationCurve(removed, np.clip(rate, 0, 1))
+    rate = np.clip(bad_left / (1 - removed[:-1]), 0, 1)
+    return SparsificationCurve(removed, np.append(rate, rate[-1]))
 
 
 def optimal_curve(bad_rate: float, steps: int = 200) -> SparsificationCurve:
     """The curve of a confidence that knows every bad pixel: max(0, e - r) / (1 - r) for share r removed."""
     removed = np.linspace(0, 1, steps + 1)
-    rate = np.append(
-        np.maximum(bad_rate - removed[:-1], 0) / (1 - removed[:-1]), 1.0 if bad_rate == 1 else 0.0
-    )
-    return SparsificationCurve(removed, rate)
+    rate = np.maximum(bad_rate - removed[:-1], 0) / (1 - removed[:-1])
+    return SparsificationCurve(removed, np.append(rate, rate[-1]))
 
 
 def optimal_auc(bad_rate: float) -> float:

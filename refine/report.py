@@ -12,7 +12,7 @@ from refine.report_tables import (
     confidence_table,
     error_table,
     frame_table,
-    ratio_table,
+    ratio_tables,
     summary_tiles,
 )
 from refine.results import mean_curves, results_csv, results_json
@@ -72,7 +72,7 @@ def report_html(evaluation: Evaluation, context: ReportContext) -> str:
         threshold=f"{evaluation.options.bad_threshold:g}",
         tiles=summary_tiles(evaluation),
         errors=error_table(evaluation),
-        ratios=ratio_table(evaluation),
+        ratios=ratio_tables(evaluation),
         confidences=confidence_table(evaluation),
         frame_rows=frame_table(evaluation),
         first_curves=svg(curve_figure(first.curves, first.initial_bad, f"First frame, {first.name}")),

@@ -108,8 +108,8 @@ def curve_figure(measured: Mapping[str, SparsificationCurve], bad_rate: float | 
         CONFIDENCE_LABELS.get(name, name): (curve.removed * 100, curve.bad_rate * 100)
         for name, curve in shown.items()
     }
-    dashed = [CONFIDENCE_LABELS[name] for name in BOUNDS]
-    return curves(series, "least confident pixels removed, %", "bad pixels left, %", title, dashed)
+    bounds = [CONFIDENCE_LABELS[name] for name in BOUNDS]
+    return curves(series, "least confident pixels removed, %", "bad pixels left, %", title, bounds)
 
 
 def auc_figure(frames: Sequence[FrameScore]) -> Figure:
@@ -121,8 +121,10 @@ def auc_figure(frames: Sequence[FrameScore]) -> Figure:
         CONFIDENCE_LABELS.get(name, name): (place, [frame.aucs.get(name, math.nan) for frame in known])
         for name in names
     }
-    dashed = [CONFIDENCE_LABELS[name] for name in BOUNDS]
-    return curves(series, "frames, sorted by their optimal AUC", "AUC", "Every frame", dashed, marker="o")
+    bounds = [CONFIDENCE_LABELS[name] for name in BOUNDS]
+    return curves(
+        series, "frames, sorted by their optimal AUC", "AUC", "Every frame", bounds, marker="o", whole_x=True
+    )
 
 
 def _lens(panel: Panel, refined: NDArray[np.float32]) -> Lens | None:

@@ -86,7 +86,8 @@ def error_table(evaluation: Evaluation) -> Table:
     columns = {name: _error_values(score) for name, score in evaluation.scores.items()}
     rivals = [values for name, values in columns.items() if name not in evaluation.upper_bounds]
     best = [
-        min((value for value in column if not math.isnan(value)), default=math.nan) for column in zip(*rivals)
+        min((value for value in column if not math.isnan(value)), default=math.nan)
+        for column in zip(*rivals, strict=True)
     ]
     rows = []
     for name, values in columns.items():
@@ -112,18 +113,26 @@ def error_table(evaluation: Evaluation) -> Table:
     )
 
 
-def ratio_table(evaluation: Evaluation) -> Table:
-    """Each method's errors divided by the regressor's, ours and the paper's."""
-    headings = ("Errors ÷ regressor's", "bad, all", "EPE, all", "bad, occ.", "EPE, occ.", "gradient")
-    sources = {"here": {name: flat(score) for name, score in evaluation.scores.items()}}
-    sources |= {f"paper, {name}": scores for name, scores in PAPER.items()}
-    rows = []
-    for method, label in evaluation.labels.items():
-        for source, scores in sources.items():
-            if method == "regressor" or method not in scores or "regressor" not in scores:
-                continue
-            rows.append((f"{label}: {source}", _ratios(scores[method], scores["regressor"])))
-    return Table(headings, tuple(rows))
+def ratio_tables(evaluation: Evaluation) -> list[tuple[str, Table]]:
+    """For each method that both have, its errors divided by the regressor's, here and in the paper; ours
+    first."""
+    here = {name: flat(score) for name, score in evaluation.scores.items()}
+    if "regressor" not in here:
+        return []
+    headings = ("Measured on", "bad, all", "EPE, all", "bad, occ.", "EPE, occ.", "gradient, smooth")
+    tables = []
+    for method in sorted(
+        here.keys() - {"regressor"}, key=lambda name: (name != "ours", list(here).index(name))
+    ):
+        rows = [
+            (f"paper, {name}", _ratios(scores[method], scores["regressor"]))
+            for name, scores in PAPER.items()
+            if method in scores
+        ]
+        if rows:
+            rows.insert(0, ("here", _ratios(here[method], here["regressor"])))
+            tables.append((evaluation.labels[method], Table(headings, tuple(rows))))
+    return tables
 
 
 def confidence_table(evaluation: Evaluation) -> Table:

@@ -14,6 +14,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from viewing.pictures import Picture
@@ -80,18 +81,30 @@ def curves(
     x_label: str,
     y_label: str,
     title: str = "",
-    dashed: Sequence[str] = (),
+    references: Sequence[str] = (),
     marker: str | None = None,
+    whole_x: bool = False,
 ) -> Figure:
-    """Named curves (x, y) in one plot; those in `dashed` are references, drawn thin and dashed in grey."""
+    """Named curves (x, y) in one plot.
+
+    Args:
+        series: Name to the points of a curve.
+        x_label, y_label, title: Texts, units included.
+        references: Names of the curves that are there for comparison: thin, grey, each with dashes of its
+            own.
+        marker: matplotlib's code of a marker at every point, for few points.
+        whole_x: Whether x counts something, so that its ticks are whole numbers.
+    """
     figure, axes = new_plot()
     colors = iter(SERIES_COLORS * (1 + len(series) // len(SERIES_COLORS)))
+    dashes = iter(((0, (1, 2)), (0, (5, 3)), (0, (5, 2, 1, 2))) * (1 + len(references) // 3))
     with rc_context(STYLE):
         for name, (x, y) in series.items():
-            if name in dashed:
-                axes.plot(x, y, color="#888888", linestyle=(0, (4, 3)), linewidth=1.1, label=name)
+            if name in references:
+                axes.plot(x, y, color="#888888", linestyle=next(dashes), linewidth=1.2, label=name)
             else:
                 axes.plot(x, y, color=next(colors), label=name, marker=marker, markersize=3)
+        axes.xaxis.set_major_locator(MaxNLocator(nbins="auto", steps=[1, 2, 5, 10], integer=whole_x))
         _labelled(axes, x_label, y_label, title, legend=len(series) > 1)
     return figure
 

@@ -1,0 +1,56 @@
+"""One picture of one refinement: what went in, what came out."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from viewing import Picture, confidence_picture, disparity_picture
+from viewing.plots import STYLE, pixels
+
+CELL_WIDTH_IN = 4.6
+"""Width of each of the four pictures."""
+
+
+def overview_picture(
+    image: NDArray[np.uint8], initial: ArrayLike, confidence: ArrayLike, refined: ArrayLike
+) -> Picture:
+    """Image, initial disparity, confidence and refined disparity, labelled, with their scales.
+
+    Both disparities have one scale, whose end is the 99.5th percentile of the refined one, so that a few wild
+    pixels do not darken everything else.
+
+    Args:
+        image: (H, W, 3) uint8, the left view.
+        initial: (H, W) pixels, NaN where there is none.
+        confidence: (H, W) in [0, 1].
+        refined: (H, W) pixels.
+
+    Returns:
+        (H', W', 3) uint8.
+    """
+    refined_values = np.asarray(refined, dtype=np.float64)
+    maximum = max(float(np.nanpercentile(refined_values, 99.5)), 1.0)
+    cells = (
+        ("Left image", image, None),
+        ("Initial disparity, px", disparity_picture(initial, maximum), ("magma", maximum)),
+        ("Confidence", confidence_picture(confidence), ("viridis", 1.0)),
+        ("Refined disparity, px", disparity_picture(refined_values, maximum), ("magma", maximum)),
+    )
+    height_in = CELL_WIDTH_IN * image.shape[0] / image.shape[1] + 0.45
+    figure = Figure(figsize=(2 * CELL_WIDTH_IN, 2 * height_in), layout="constrained")
+    with rc_context(STYLE):
+        for place, (title, picture, scale) in enumerate(cells, start=1):
+            axes = figure.add_subplot(2, 2, place)
+            axes.imshow(picture, interpolation="antialiased")
+            axes.set_title(title, loc="left")
+            axes.set_axis_off()
+            colors = ScalarMappable(Normalize(0, scale[1]), scale[0]) if scale else ScalarMappable()
+            bar = figure.colorbar(colors, ax=axes, fraction=0.035, pad=0.015)
+            # The image has no scale, but keeps the room of one so that all four pictures have one size.
+            bar.ax.set_visible(scale is not None)
+    return pixels(figure)
