@@ -82,6 +82,9 @@ class PairCache:
                 break
             self._pairs[key] = pair
 
+    def __len__(self) -> int:
+        return len(self._pairs)
+
     def __getitem__(self, key: tuple[int, int]) -> StereoPair:
         """The pair of (source, frame)."""
         pair = self._pairs.get(key)

@@ -1,0 +1,96 @@
+"""Which crop a draw gives: decided by seed and number alone."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from datagen import DatasetError
+from tests.training.synthetic import write_dataset
+from training.data import PairCache, Source, StereoDataModule, open_sources, schedule_draws
+from training.errors import TrainingError
+from training.presets import OptimizerConfig, Preset
+
+PRESET = Preset(
+    steps=12, batch_size=2, crop_width=64, crop_height=64, optimizer=OptimizerConfig(), validation_interval=5
+)
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    root = tmp_path_factory.mktemp("data")
+    return write_dataset(root / "a", 0, train=3, val=2), write_dataset(root / "b", 1, train=2)
+
+
+def module_of(folders: tuple[Path, Path], seed: int = 0, **options: int) -> StereoDataModule:
+    sources, validation = open_sources([(folders[0], 2.0), (folders[1], 1.0)], (64, 64))
+    return StereoDataModule(sources, validation, PRESET, PRESET.steps, seed, **options)
+
+
+def lefts(module: StereoDataModule, block: int = 0, rank: int = 0, processes: int = 1) -> torch.Tensor:
+    return torch.cat([batch["left"] for batch in module.block(block, rank, processes)])
+
+
+def test_draws_do_not_depend_on_workers_or_cache(folders: tuple[Path, Path]) -> None:
+    reference = lefts(module_of(folders))
+    torch.testing.assert_close(lefts(module_of(folders, workers=2)), reference, rtol=0, atol=0)
+    torch.testing.assert_close(lefts(module_of(folders, cache_bytes=0)), reference, rtol=0, atol=0)
+    assert not torch.equal(lefts(module_of(folders, seed=1)), reference)
+
+
+def test_two_processes_share_the_draws_of_one_with_double_batch(folders: tuple[Path, Path]) -> None:
+    module = module_of(folders)
+    first, second = (list(module.block(0, rank, 2)) for rank in range(2))
+    together = [torch.cat([a["left"], b["left"]]) for a, b in zip(first, second, strict=True)]
+    sources, validation = open_sources([(folders[0], 2.0), (folders[1], 1.0)], (64, 64))
+    double = Preset(**{**vars(PRESET), "batch_size": 4})
+    alone = StereoDataModule(sources, validation, double, PRESET.steps, 0)
+    for pair, batch in zip(together, alone.block(0), strict=True):
+        torch.testing.assert_close(pair, batch["left"], rtol=0, atol=0)
+
+
+def test_blocks_divide_the_run(folders: tuple[Path, Path]) -> None:
+    module = module_of(folders)
+    assert [len(module.block(number)) for number in range(3)] == [5, 5, 2]
+    crops = torch.cat([lefts(module, number) for number in range(3)])
+    assert len(torch.unique(crops.flatten(1), dim=0)) == 24
+
+
+def test_schedule_takes_every_frame_once_a_pass_and_sources_by_weight() -> None:
+    frames: list[Source] = [Source([None] * 7, 3.0), Source([None] * 4, 1.0)]  # type: ignore[list-item]
+    schedule = schedule_draws(frames, 4000, seed=5)
+    assert (schedule[:, 0] == 0).mean() == pytest.approx(0.75, abs=0.03)
+    for source, count in ((0, 7), (1, 4)):
+        order = schedule[schedule[:, 0] == source, 1]
+        passes = order[: len(order) // count * count].reshape(-1, count)
+        assert (np.sort(passes, axis=1) == np.arange(count)).all()
+        assert not (passes == passes[0]).all()
+    np.testing.assert_array_equal(schedule_draws(frames, 100, seed=5), schedule[:100])
+
+
+def test_cache_is_bounded(folders: tuple[Path, Path]) -> None:
+    sources, _ = open_sources([(folders[0], 1.0)], (64, 64))
+    one = 2 * 64 * 128 * (3 + 4)
+    for capacity, kept in ((0, 0), (one, 1), (2 * one + 1, 2), (100 * one, 3)):
+        cache = PairCache(sources, capacity)
+        assert len(cache) == kept
+        np.testing.assert_array_equal(cache[0, 2].left, sources[0].frames[2].left)
+
+
+def test_validation_frames_are_whole(folders: tuple[Path, Path]) -> None:
+    batches = list(module_of(folders).val_dataloader())
+    assert len(batches) == 2
+    assert batches[0]["left"].shape == (1, 3, 64, 128)
+    assert torch.isnan(batches[0]["gradient"][:, :, -1]).all()
+
+
+def test_wrong_requests_are_sentences(folders: tuple[Path, Path], tmp_path: Path) -> None:
+    with pytest.raises(TrainingError, match="at least one data set"):
+        open_sources([], (64, 64))
+    with pytest.raises(TrainingError, match="weight of a data set must be positive, got 0"):
+        open_sources([(folders[0], 0.0)], (64, 64))
+    with pytest.raises(TrainingError, match="frames of 128x64 are smaller than the preset's 256x64 crops"):
+        open_sources([(folders[0], 1.0)], (64, 256))
+    with pytest.raises(DatasetError, match="no such folder"):
+        open_sources([(tmp_path / "nothing", 1.0)], (64, 64))

@@ -1,0 +1,129 @@
+"""The full presets are the published training; schedules follow their definition."""
+
+import math
+from dataclasses import fields, is_dataclass
+
+import pytest
+import torch
+
+from training.metrics import bad_rate, gradient_error, optimal_auc, sparsification_auc
+from training.networks import DispNetConfig, DispNetCorr1D, HeadConfig
+from training.presets import (
+    PRESETS,
+    ConfNetPreset,
+    FineTuningPreset,
+    GradNetPreset,
+    OptimizerConfig,
+    RegressorPreset,
+    find_preset,
+)
+from training.tasks import RegressorTask
+from training.tasks.base import learning_rate_factor
+
+
+def test_full_regressor() -> None:
+    preset = find_preset("regressor", "full")
+    assert isinstance(preset, RegressorPreset)
+    assert preset.network == DispNetConfig() == DispNetConfig(1.0, 40, False, "none", 1.0)
+    assert (preset.batch_size, preset.crop_width, preset.crop_height) == (4, 768, 384)
+    optimizer = preset.optimizer
+    assert (optimizer.learning_rate, optimizer.betas, optimizer.epsilon) == (1e-4, (0.9, 0.999), 1e-4)
+    assert optimizer.halve_at == (200_000, 350_000, 500_000, 650_000, 800_000)
+    assert (optimizer.weight_decay, optimizer.clip_norm, optimizer.warmup_steps) == (4e-4, None, 0)
+    augmentation = preset.augmentation
+    assert (augmentation.translation, augmentation.log_zoom, augmentation.log_squeeze) == (
+        0.4,
+        (-0.2, 0.6),
+        (-0.3, 0.3),
+    )
+    assert (augmentation.noise, augmentation.horizontal_flip, augmentation.vertical_flip) == (0.06, 0, 0)
+
+
+def test_full_heads() -> None:
+    confnet, gradnet = find_preset("confnet", "full"), find_preset("gradnet", "full")
+    fine_tuning = find_preset("regressor_f", "full")
+    assert isinstance(confnet, ConfNetPreset)
+    assert isinstance(gradnet, GradNetPreset)
+    assert isinstance(fine_tuning, FineTuningPreset)
+    assert (confnet.steps, confnet.optimizer.learning_rate, confnet.optimizer.weight_decay) == (
+        320_000,
+        1e-3,
+        5e-4,
+    )
+    assert confnet.optimizer.halve_at == tuple(range(40_000, 320_000, 40_000))
+    assert (gradnet.steps, gradnet.optimizer.learning_rate, gradnet.optimizer.weight_decay) == (
+        200_000,
+        1e-4,
+        4e-4,
+    )
+    assert gradnet.optimizer.halve_at == tuple(range(20_000, 200_000, 20_000))
+    assert confnet.network == HeadConfig(97, 64, 128, 0.5, "none", False)
+    assert gradnet.network == HeadConfig(97, 64, 128, 0.2, "none", False)
+    assert (confnet.correct_within_px, gradnet.gradient_threshold_px) == (1.0, 1.0)
+    assert fine_tuning.gradient_weight == 5.0
+
+
+@pytest.mark.parametrize("task", PRESETS)
+@pytest.mark.parametrize("name", ["tiny", "small", "full"])
+def test_presets_are_coherent(task: str, name: str) -> None:
+    preset = find_preset(task, name)
+    assert preset.crop_width % 64 == preset.crop_height % 64 == 0
+    assert preset.optimizer.warmup_steps < preset.steps
+    for field in fields(preset):
+        value = getattr(preset, field.name)
+        if is_dataclass(value):
+            hash(value)
+    if isinstance(preset, RegressorPreset):
+        assert list(preset.stage_ends) == sorted(preset.stage_ends)
+        assert preset.stage_ends[-1] <= preset.steps
+
+
+def test_decay_reaches_the_contracting_weights_only() -> None:
+    preset = find_preset("regressor", "full")
+    assert isinstance(preset, RegressorPreset)
+    network = DispNetCorr1D(DispNetConfig(width=0.0625))
+    task = RegressorTask(preset, network, preset.steps, seed=0)
+    decayed, free = task.configure_optimizers()["optimizer"].param_groups
+    assert (decayed["weight_decay"], free["weight_decay"]) == (4e-4, 0)
+    assert {id(p) for p in decayed["params"]} == {id(p) for p in network.contracting_weights()}
+    trained = {id(p) for p in network.parameters() if p.requires_grad}
+    assert {id(p) for group in (decayed, free) for p in group["params"]} == trained
+
+
+def test_halving() -> None:
+    config = OptimizerConfig(halve_at=(100, 300))
+    factors = [learning_rate_factor(config, step, 400, 400) for step in (0, 99, 100, 299, 300, 399)]
+    assert factors == [1, 1, 0.5, 0.5, 0.25, 0.25]
+    assert [learning_rate_factor(config, step, 40, 400) for step in (9, 10, 29, 30)] == [1, 0.5, 0.5, 0.25]
+
+
+def test_warmup_and_cosine() -> None:
+    config = OptimizerConfig(schedule="cosine", warmup_steps=10)
+    factors = [learning_rate_factor(config, step, 100, 100) for step in range(100)]
+    assert factors[0] == pytest.approx(1 / 11)
+    assert factors[:11] == sorted(factors[:11])
+    assert factors[50] == pytest.approx(0.5)
+    assert factors[99] == pytest.approx(0.5 * (1 + math.cos(math.pi * 0.99)))
+    assert learning_rate_factor(config, 500, 1000, 100) == pytest.approx(0.5)
+
+
+def test_sparsification() -> None:
+    """Perfect confidence gives the optimal area, constant confidence the bad rate, reversed more than that."""
+    generator = torch.Generator().manual_seed(0)
+    truth = torch.zeros(1, 1, 100, 200)
+    disparity = 4 * torch.rand(truth.shape, generator=generator)
+    truth[..., :20] = torch.nan
+    rate = bad_rate(disparity, truth, 1.0)
+    assert rate.item() == pytest.approx(0.75, abs=0.01)
+    perfect = sparsification_auc(-disparity, disparity, truth)
+    assert perfect.item() == pytest.approx(optimal_auc(rate).item(), abs=2e-3)
+    assert optimal_auc(torch.tensor(0.2348)).item() == pytest.approx(0.0300, abs=1e-4)
+    constant = sparsification_auc(torch.zeros_like(truth), disparity, truth)
+    assert constant.item() == pytest.approx(rate.item(), abs=0.02)
+    assert sparsification_auc(disparity, disparity, truth) > constant
+
+
+def test_gradient_error_counts_smooth_pixels() -> None:
+    truth = torch.tensor([[[[0.0, 0.5, 3.0, torch.nan]], [[0.25, -0.5, 0.0, 0.0]]]])
+    gradient = torch.tensor([[[[0.1, 0.5, 0.0, 0.0]], [[0.0, 0.0, 0.0, 0.0]]]])
+    assert gradient_error(gradient, truth, 1.0).item() == pytest.approx((0.1 + 0.25 + 0.5) / 2)

@@ -1,0 +1,228 @@
+"""Whole runs on data sets on disk: they learn, resume exactly, and say what is wrong."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import pytorch_lightning as pl
+import safetensors.torch
+import torch
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from datagen import DatasetError, StereoDataset
+from tests.training.synthetic import write_dataset
+from training.augmentation import NO_AUGMENTATION
+from training.errors import TrainingError
+from training.networks import DispNetConfig
+from training.predict import StereoPredictor
+from training.presets import Preset, RegressorPreset, find_preset
+from training.train import train
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_thread() -> Iterator[None]:
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_dataset(tmp_path_factory.mktemp("set"), 0, train=4, val=2)
+
+
+def quick(task: str, **changes: object) -> Preset:
+    """The tiny preset on small crops."""
+    small = {"crop_width": 128, "crop_height": 64, "batch_size": 4, "validation_interval": 4}
+    return replace(find_preset(task, "tiny"), **(small | changes))  # type: ignore[arg-type]
+
+
+def quick_regressor(**changes: object) -> RegressorPreset:
+    preset = quick("regressor", **changes)
+    assert isinstance(preset, RegressorPreset)
+    return replace(preset, network=replace(preset.network, width=0.0625))
+
+
+@pytest.fixture(scope="module")
+def run(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run folder with a regressor of a few steps."""
+    folder = tmp_path_factory.mktemp("run")
+    train("regressor", [(data, 1.0)], folder, quick_regressor(), steps=6, progress=False)
+    return folder
+
+
+def weights(run: Path, task: str) -> dict[str, torch.Tensor]:
+    return safetensors.torch.load_file(run / f"{task}.safetensors")
+
+
+def scalars(run: Path, task: str, name: str) -> dict[int, float]:
+    events = EventAccumulator(str(run / "logs" / task))
+    events.Reload()
+    return {event.step: event.value for event in events.Scalars(name)}
+
+
+@pytest.mark.slow
+def test_overfits_four_samples(data: Path, tmp_path: Path) -> None:
+    """The regressor, then both heads on it, learn four pairs nearly by heart."""
+    regressor = replace(
+        quick_regressor(augmentation=NO_AUGMENTATION), network=DispNetConfig(0.125, 10, True, "batch", 16.0)
+    )
+    steps = {"regressor": 500, "confnet": 150, "gradnet": 150}
+    presets = {task: quick(task, augmentation=NO_AUGMENTATION) for task in ("confnet", "gradnet")}
+    final = {}
+    for task, preset in ({"regressor": regressor} | presets).items():
+        preset = replace(preset, validation_interval=500)
+        train(task, [(data, 1.0)], tmp_path, preset, steps=steps[task], progress=False)
+        losses = scalars(tmp_path, task, "train/loss")
+        final[task] = losses[max(losses)], losses[min(losses)]
+    assert final["regressor"][0] < 0.6, final
+    assert final["confnet"][0] < 0.3, final
+    assert final["gradnet"][0] < 0.03, final
+
+
+@pytest.mark.parametrize("task", ["regressor", "regressor_f", "confnet", "gradnet"])
+def test_resumed_equals_uninterrupted(task: str, data: Path, run: Path, tmp_path: Path) -> None:
+    """Stopped by an exception in the middle of a block and resumed: the same weights, bit for bit."""
+    preset = quick_regressor() if task == "regressor" else quick(task)
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    for folder in (whole, broken):
+        folder.mkdir()
+        if task != "regressor":
+            for file in run.glob("regressor.*"):
+                shutil.copy(file, folder)
+    train(task, [(data, 1.0)], whole, preset, steps=11, seed=3, progress=False)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pl.LightningModule, "on_train_batch_end", _stop_after(6), raising=True)
+        with pytest.raises(_PowerCut):
+            train(task, [(data, 1.0)], broken, preset, steps=11, seed=3, progress=False)
+    train(task, [(data, 1.0)], broken, preset, steps=11, seed=3, resume=True, progress=False)
+
+    expected, got = weights(whole, task), weights(broken, task)
+    assert expected.keys() == got.keys()
+    assert all(torch.equal(expected[name], got[name]) for name in expected)
+    assert json.loads((whole / f"{task}.json").read_text()) == json.loads(
+        (broken / f"{task}.json").read_text()
+    )
+    state = [
+        torch.load(folder / "logs" / task / "last.ckpt", weights_only=True) for folder in (whole, broken)
+    ]
+    for name, tensor in state[0]["state_dict"].items():
+        assert torch.equal(tensor, state[1]["state_dict"][name])
+
+
+class _PowerCut(Exception):  # noqa: N818
+    pass
+
+
+def _stop_after(steps: int) -> object:
+    def on_train_batch_end(self: pl.LightningModule, *_: object) -> None:
+        if self.global_step == steps:
+            raise _PowerCut
+
+    return on_train_batch_end
+
+
+def test_resuming_a_finished_run_changes_nothing(data: Path, run: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(run, tmp_path / "run")
+    before = (folder / "regressor.safetensors").read_bytes()
+    summary = train(
+        "regressor", [(data, 1.0)], folder, quick_regressor(), steps=6, resume=True, progress=False
+    )
+    assert (folder / "regressor.safetensors").read_bytes() == before
+    assert summary.best_step in (4, 6)
+    assert set(summary.validation) == {"epe", "bad1", "bad3", "gradient"}
+
+
+def test_seed_and_workers(data: Path, tmp_path: Path) -> None:
+    """The same seed gives the same weights whatever the workers; another seed gives others."""
+    for name, seed, workers in (("a", 0, 0), ("b", 0, 1), ("c", 1, 0)):
+        train(
+            "regressor", [(data, 1.0)], tmp_path / name, quick_regressor(), steps=3, seed=seed, workers=workers,
+            progress=False,
+        )  # fmt: skip
+    first, second, third = (weights(tmp_path / name, "regressor")["pr6.weight"] for name in "abc")
+    assert torch.equal(first, second)
+    assert not torch.equal(first, third)
+
+
+def test_the_callers_random_state_is_left_alone(data: Path, tmp_path: Path) -> None:
+    torch.manual_seed(42)
+    expected = torch.rand(3)
+    torch.manual_seed(42)
+    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=1, progress=False)
+    assert torch.equal(torch.rand(3), expected)
+
+
+def test_heads_see_the_regressor_unchanged(data: Path, run: Path, tmp_path: Path) -> None:
+    """Built on another run's regressor, which is copied, frozen, BatchNorm statistics included."""
+    train("confnet", [(data, 1.0)], tmp_path, quick("confnet"), init=run, steps=3, progress=False)
+    before, after = weights(run, "regressor"), weights(tmp_path, "regressor")
+    assert all(torch.equal(before[name], after[name]) for name in before)
+    inner = torch.load(tmp_path / "logs" / "confnet" / "last.ckpt", weights_only=True)["state_dict"]
+    assert all(torch.equal(before[name], inner[f"regressor.{name}"]) for name in before)
+    sample = StereoDataset(data, "val")[0]
+    prediction = StereoPredictor(tmp_path).predict(sample.left, sample.right)
+    assert prediction.confidence is not None
+    assert prediction.confidence.shape == sample.left.shape[:2]
+
+
+def test_tensorboard_holds_figures_and_pictures(run: Path) -> None:
+    assert set(scalars(run, "regressor", "validation/epe")) == {3, 5}  # Lightning counts from 0
+    events = EventAccumulator(str(run / "logs" / "regressor"))
+    events.Reload()
+    assert events.Tags()["images"] == ["frame0", "frame1"]
+    width = events.Images("frame0")[0].width
+    assert width == 4 * 128 + 3 * 4
+
+
+def test_validation_is_optional(tmp_path: Path) -> None:
+    data = write_dataset(tmp_path / "set", 0, train=2)
+    summary = train("regressor", [(data, 1.0)], tmp_path / "run", quick_regressor(), steps=5, progress=False)
+    assert summary.best_step == 5
+    assert summary.validation == {}
+
+
+def test_a_loss_that_is_not_finite_stops_the_run(data: Path, tmp_path: Path) -> None:
+    preset = quick_regressor()
+    preset = replace(preset, optimizer=replace(preset.optimizer, learning_rate=1e30, clip_norm=None))
+    with pytest.raises(TrainingError, match=r"the loss of step \d+ is (nan|inf), so training stopped"):
+        train("regressor", [(data, 1.0)], tmp_path, preset, steps=20, progress=False)
+
+
+def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> None:
+    source = [(data, 1.0)]
+    with pytest.raises(TrainingError, match="no task 'depthnet'; there are regressor"):
+        train("depthnet", source, tmp_path)
+    with pytest.raises(TrainingError, match="regressor has no preset 'huge'; there are tiny, small, full"):
+        train("regressor", source, tmp_path, "huge")
+    with pytest.raises(TrainingError, match="at least one step"):
+        train("regressor", source, tmp_path, "tiny", steps=0)
+    with pytest.raises(TrainingError, match="no trained regressor"):
+        train("confnet", source, tmp_path / "empty", quick("confnet"), progress=False)
+    with pytest.raises(TrainingError, match="already holds a regressor; continue it with --resume"):
+        train("regressor", source, run, quick_regressor(), steps=6, progress=False)
+    with pytest.raises(TrainingError, match="started with another steps"):
+        train("regressor", source, run, quick_regressor(), steps=7, resume=True, progress=False)
+    with pytest.raises(TrainingError, match="frames of 128x64 are smaller"):
+        train("regressor", source, tmp_path / "crop", "tiny")
+    with pytest.raises(DatasetError, match="no such folder"):
+        train("regressor", [(tmp_path / "nowhere", 1.0)], tmp_path / "x", "tiny")
+
+
+def test_another_regressor_is_not_overwritten(data: Path, run: Path, tmp_path: Path) -> None:
+    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, seed=9, progress=False)
+    with pytest.raises(TrainingError, match="already holds another regressor"):
+        train("gradnet", [(data, 1.0)], tmp_path, quick("gradnet"), init=run, steps=2, progress=False)
+
+
+def test_a_damaged_image_is_a_sentence(data: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(data, tmp_path / "set")
+    image = next((copy / "frames_cleanpass" / "TRAIN").rglob("*.png"))
+    image.write_bytes(image.read_bytes()[:100])
+    with pytest.raises(DatasetError, match=image.name):
+        train("regressor", [(copy, 1.0)], tmp_path / "run", quick_regressor(), steps=1, progress=False)
