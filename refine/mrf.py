@@ -69,7 +69,8 @@ def refine_disparity(
     elsewhere.
 
     Args:
-        disparity: (H, W) initial disparity in pixels. NaN is a pixel without one, whatever its confidence.
+        disparity: (H, W) initial disparity in pixels. NaN, where there is none, counts as the nearest known
+            disparity with confidence 0.
         confidence: (H, W) in [0, 1].
         gradient: (H, W, 2) forward differences [dx, dy] of the disparity to be expected, pixels a pixel. NaN
             leaves that difference free; the last column of dx and the last row of dy are not used.
@@ -84,9 +85,8 @@ def refine_disparity(
 
     Raises:
         ValueError: If a shape, type or range is wrong, or no pixel has a disparity.
-        refine.solvers.SolverError: If the system is singular: with `beta` 0 or no confidence, a region that
-        is cut
-            off by image edges and has no disparity of its own.
+        refine.SolverError: If the system is singular: with a `confidence_floor` of 0, a region without confidence
+            that nothing ties to its surroundings.
     """
     return solve_mrf(
         disparity, confidence, gradient, image, parameters, form, solver, tolerance
@@ -105,15 +105,16 @@ def solve_mrf(
 ) -> MRFSolution:
     """`refine_disparity` with the result in float64 and an account of how it was reached."""
     began = time.perf_counter()
-    inputs = _checked(disparity, confidence, gradient, image)
+    known, trust, slopes, colors = _checked(disparity, confidence, gradient, image)
     if form not in ("exact", "paper"):
         raise ValueError(f"the MRF's form is 'exact' or 'paper', not {form!r}")
     if solver not in ("auto", *_SOLVERS):
         raise ValueError(f"the MRF's solver is one of 'auto', 'multigrid', 'cg', 'direct', not {solver!r}")
     if not 0 < tolerance < 1:
         raise ValueError(f"the solver's tolerance must be between 0 and 1, got {tolerance}")
-    system = build_system(*inputs, parameters, form)
-    start = _filled(inputs[0]).ravel()
+    initial = _filled(known)
+    system = build_system(initial, np.where(np.isnan(known), 0, trust), slopes, colors, parameters, form)
+    start = initial.ravel()
     name = solver
     if solver == "auto":
         name = "direct" if start.size <= _DIRECT_UP_TO_PIXELS else "multigrid"
@@ -177,7 +178,7 @@ def _checked(
 
 
 def _filled(disparity: Floats) -> Floats:
-    """The disparity with every NaN replaced by the nearest known value: where the iterative solvers start."""
+    """The disparity with every NaN replaced by the nearest known value."""
     unknown = np.isnan(disparity)
     if not unknown.any():
         return disparity

@@ -41,7 +41,7 @@ def overview_picture(
         ("Confidence", confidence_picture(confidence), ("viridis", 1.0)),
         ("Refined disparity, px", disparity_picture(refined_values, maximum), ("magma", maximum)),
     )
-    height_in = CELL_WIDTH_IN * image.shape[0] / image.shape[1] + 0.45
+    height_in = CELL_WIDTH_IN * image.shape[0] / image.shape[1] * 0.93 + 0.3
     figure = Figure(figsize=(2 * CELL_WIDTH_IN, 2 * height_in), layout="constrained")
     with rc_context(STYLE):
         for place, (title, picture, scale) in enumerate(cells, start=1):
@@ -49,8 +49,10 @@ def overview_picture(
             axes.imshow(picture, interpolation="antialiased")
             axes.set_title(title, loc="left")
             axes.set_axis_off()
-            colors = ScalarMappable(Normalize(0, scale[1]), scale[0]) if scale else ScalarMappable()
-            bar = figure.colorbar(colors, ax=axes, fraction=0.035, pad=0.015)
-            # The image has no scale, but keeps the room of one so that all four pictures have one size.
-            bar.ax.set_visible(scale is not None)
+            # The image has no scale, but keeps the room of one, so that all four pictures have one size.
+            bar = axes.inset_axes((1.015, 0, 0.03, 1))
+            if scale is None:
+                bar.set_visible(False)
+            else:
+                figure.colorbar(ScalarMappable(Normalize(0, scale[1]), scale[0]), cax=bar)
     return pixels(figure)

@@ -5,8 +5,8 @@
           + beta  sum_p phibar_p (S_p - sum_q w_pq S_q)^2,       phibar = 2 - phi_x - phi_y
 
 D is the initial disparity, tau its confidence, G the predicted gradient, phi and w the image's weights
-(`refine.weights`). A gradient term exists where the neighbour is inside the image and G is not NaN; a data
-term where D is not NaN.
+(`refine.weights`). A gradient term exists where the neighbour is inside the image and G is not
+NaN.
 """
 
 from __future__ import annotations
@@ -103,10 +103,9 @@ def build_system(
 ) -> MRFSystem:
     """Put a refinement problem into equations (shapes as for `refine.refine_disparity`, not checked here)."""
     phi_x, phi_y = edge_weights(image, parameters.sigma_r)
-    known = np.isfinite(disparity)
-    data_weight = np.where(known, np.maximum(confidence, parameters.confidence_floor), 0.0).ravel()
+    data_weight = np.maximum(confidence, parameters.confidence_floor).ravel()
     matrix = sp.diags_array(data_weight)
-    right_hand_side = data_weight * np.where(known, disparity, 0.0).ravel()
+    right_hand_side = data_weight * disparity.ravel()
     for axis, phi, wanted in ((1, phi_x, gradient[..., 0]), (0, phi_y, gradient[..., 1])):
         weight = parameters.alpha * np.where(np.isfinite(wanted), phi, 0.0).ravel()
         difference = forward_difference(disparity.shape, axis)
