@@ -19,8 +19,8 @@ from scenes.mesh import Mesh
 Vertices = NDArray[np.float64]
 Triangles = NDArray[np.int64]
 
-_MIN_RELATIVE_AREA = 1e-12
-"""Triangles smaller than this (local units squared) have no direction worth keeping."""
+_MIN_DOUBLE_AREA = 1e-12
+"""Triangles of less than half this area (local units squared) have no direction worth keeping."""
 
 
 def solid(
@@ -29,24 +29,28 @@ def solid(
     *,
     uv: NDArray[np.float64] | None = None,
     smooth: bool = False,
-    crease_deg: float = 40.0,
+    crease_deg: float | None = 40.0,
 ) -> Mesh:
     """Finish a closed surface into a Mesh: fitted to the unit cube, outward, welded, clean, textured.
 
     `uv` (F, 3, 2) are texture coordinates in the units of `vertices`; without them the surface is box
-    mapped. With `smooth`, edges sharper than `crease_deg` stay sharp: their vertices are split.
+    mapped. With `smooth`, edges sharper than `crease_deg` stay sharp: their vertices are split (None where
+    there are no such edges).
     """
     vertices, factor = fit_to_cube(vertices)
     vertices, triangles, kept = weld(vertices, triangles)
+    normals = scaled_normals(vertices, triangles)
     if uv is not None:
         uv = uv[kept] * factor
-    if signed_volume(vertices, triangles) < 0:
+    # The divergence theorem: positive when the triangles run counter-clockwise seen from outside.
+    if np.einsum("ij,ij->", vertices[triangles[:, 0]], normals) < 0:
         triangles = triangles[:, ::-1]
         uv = None if uv is None else uv[:, ::-1]
+        normals = -normals
     if uv is None:
-        uv = box_uv(vertices, triangles)
-    if smooth:
-        vertices, triangles = split_creases(vertices, triangles, crease_deg)
+        uv = _box_uv(vertices, triangles, normals)
+    if smooth and crease_deg is not None:
+        vertices, triangles = split_creases(vertices, triangles, normals, crease_deg)
     return Mesh(
         np.ascontiguousarray(vertices),
         np.ascontiguousarray(triangles, np.int32),
@@ -67,46 +71,55 @@ def weld(vertices: Vertices, triangles: Triangles) -> tuple[Vertices, Triangles,
 
     Returns the vertices in use, the remaining triangles and their indices among the given ones.
     """
-    keys = np.ascontiguousarray(np.round(vertices * 1e8).astype(np.int64))
-    order = np.lexsort(keys.T)
-    new_group = np.concatenate([[True], (keys[order][1:] != keys[order][:-1]).any(axis=1)])
+    low = vertices.min(axis=0)
+    # 21 bits an axis in one integer. The odd factor keeps 0, 1/2 and the like off the rounding boundaries.
+    cells = np.round((vertices - low) * (2097000.123 / float(np.ptp(vertices, axis=0).max()))).astype(
+        np.int64
+    )
+    keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
+    order = np.argsort(keys, kind="stable")
+    new_group = np.concatenate([[True], np.diff(keys[order]) != 0])
     label = np.empty(len(vertices), np.int64)
     label[order] = np.cumsum(new_group) - 1
     vertices, triangles = vertices[order[new_group]], label[triangles]
-    kept = np.flatnonzero(np.linalg.norm(_scaled_normals(vertices, triangles), axis=1) > _MIN_RELATIVE_AREA)
-    used, triangles = np.unique(triangles[kept], return_inverse=True)
-    return vertices[used], triangles.reshape(-1, 3), kept
+    normals = scaled_normals(vertices, triangles)
+    kept = np.flatnonzero(np.einsum("ij,ij->i", normals, normals) > _MIN_DOUBLE_AREA**2)
+    triangles = triangles[kept]
+    used = np.zeros(len(vertices), bool)
+    used[triangles] = True
+    return vertices[used], (np.cumsum(used) - 1)[triangles], kept
 
 
-def _scaled_normals(vertices: Vertices, triangles: Triangles) -> Vertices:
+def scaled_normals(vertices: Vertices, triangles: Triangles) -> Vertices:
     """(F, 3) triangle normals, their length twice the area."""
-    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
-    normals: Vertices = np.cross(b - a, c - a)
+    origin = vertices[triangles[:, 0]]
+    one, two = vertices[triangles[:, 1]] - origin, vertices[triangles[:, 2]] - origin
+    normals = np.empty_like(one)
+    for axis, (u, v) in enumerate(((1, 2), (2, 0), (0, 1))):
+        normals[:, axis] = one[:, u] * two[:, v] - one[:, v] * two[:, u]
     return normals
-
-
-def signed_volume(vertices: Vertices, triangles: Triangles) -> float:
-    """Enclosed volume, positive when the triangles run counter-clockwise seen from outside."""
-    a = vertices[triangles[:, 0]]
-    return float(np.einsum("ij,ij->", a, _scaled_normals(vertices, triangles))) / 6.0
 
 
 def box_uv(vertices: Vertices, triangles: Triangles) -> NDArray[np.float64]:
     """(F, 3, 2) texture coordinates: each triangle projected along its normal's dominant axis."""
-    axis = np.abs(_scaled_normals(vertices, triangles)).argmax(axis=1)
-    across = np.array([(1, 2), (0, 2), (0, 1)])[axis]
-    uv: NDArray[np.float64] = np.take_along_axis(vertices[triangles], across[:, None, :], axis=2)
-    return uv
+    return _box_uv(vertices, triangles, scaled_normals(vertices, triangles))
 
 
-def split_creases(vertices: Vertices, triangles: Triangles, angle_deg: float) -> tuple[Vertices, Triangles]:
+def _box_uv(vertices: Vertices, triangles: Triangles, normals: Vertices) -> NDArray[np.float64]:
+    axis = np.abs(normals).argmax(axis=1)[:, None]
+    u, v = np.array([1, 0, 0])[axis], np.array([2, 2, 1])[axis]
+    return np.stack([vertices[triangles, u], vertices[triangles, v]], axis=-1)
+
+
+def split_creases(
+    vertices: Vertices, triangles: Triangles, normals: Vertices, angle_deg: float
+) -> tuple[Vertices, Triangles]:
     """Give each side of every sharp edge its own vertices, so that interpolated normals stop there.
 
     Corners of triangles are joined across edges whose dihedral angle is below `angle_deg`; each connected
     group of corners becomes one vertex.
     """
-    normals = _scaled_normals(vertices, triangles)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
     order = np.argsort(key, kind="stable")
@@ -287,7 +300,7 @@ def extrude_triangles(
     outline = ~np.isin(start * count + end, end * count + start)
     a, b = start[outline], end[outline]
     walls = np.concatenate([np.stack([a, b, b + count], -1), np.stack([a, b + count, a + count], -1)])
-    vertices = np.concatenate([flat, flat + (0.0, 0.0, height)])
+    vertices = np.concatenate([flat, flat + np.array((0.0, 0.0, height))])
     return vertices, np.concatenate([triangles[:, ::-1], triangles + count, walls])
 
 

@@ -1,10 +1,14 @@
 """What the texture generators share: palettes, periodic noise, colouring and film grain.
 
-Pictures are painted as float32 in 0..255 (sRGB), fields as float32 of unit variance or in 0..1; everything
+Pictures are painted as float32 (3, H, W) in 0..255 (sRGB), fields as float32 (H, W) of unit variance or in
+0..1; channels come first because numpy multiplies pictures by fields many times faster that way. Everything
 is periodic, because materials repeat their textures.
 """
 
 from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +17,9 @@ from scipy import fft
 from scenes.drawing import choose
 
 Field = NDArray[np.float32]
-"""(H, W) or, with colour, (H, W, 3)."""
+"""(H, W)."""
+Picture = NDArray[np.float32]
+"""(3, H, W), or (3, 1, 1) for a colour."""
 Srgb = tuple[int, int, int]
 """0..255."""
 Palette = tuple[Srgb, ...]
@@ -91,17 +97,27 @@ def spectral_noise(
     pattern out. Photographs have a slope of about 1 (Field 1987).
     """
     height, width = (size, size) if isinstance(size, int) else size
+    gain = _spectral_gain(height, width, slope, low_cycles, high_cycles, stretch)
+    spectrum = rng.standard_normal((height, 2 * gain.shape[1]), dtype=np.float32).view(np.complex64) * gain
+    noise: Field = fft.irfft2(spectrum, s=(height, width), overwrite_x=True)
+    noise *= np.float32(1 / max(float(noise.std()), 1e-12))
+    return noise
+
+
+@lru_cache(maxsize=64)
+def _spectral_gain(
+    height: int, width: int, slope: float, low_cycles: float, high_cycles: float, stretch: tuple[float, float]
+) -> Field:
+    """Amplitudes (height, width // 2 + 1) of a real picture's spectrum; kept, as many textures ask for the same."""
     fy = fft.fftfreq(height, 1.0 / height).astype(np.float32)[:, None] * np.float32(stretch[1])
     fx = fft.rfftfreq(width, 1.0 / width).astype(np.float32)[None, :] * np.float32(stretch[0])
     squared = fx * fx + fy * fy
     squared[0, 0] = 1.0
-    gain = squared ** np.float32(-slope / 2)
+    gain = np.exp(np.float32(-slope / 2) * np.log(squared))
     gain[(squared < low_cycles**2 * 0.999) | (squared > high_cycles**2)] = 0.0
     gain[0, 0] = 0.0
-    white = rng.standard_normal((2, *gain.shape), dtype=np.float32)
-    spectrum = (white[0] + 1j * white[1]) * gain
-    noise: Field = fft.irfft2(spectrum, s=(height, width))
-    return noise / max(float(noise.std()), 1e-12)
+    gain.flags.writeable = False
+    return gain
 
 
 def to_unit(noise: Field) -> Field:
@@ -109,19 +125,24 @@ def to_unit(noise: Field) -> Field:
     return 0.5 + 0.5 * np.tanh(np.float32(0.75) * noise)
 
 
-def colorize(value: Field, palette: Palette) -> Field:
-    """Map 0..1 onto a palette, blending neighbours: (H, W) to (H, W, 3)."""
+def paint(color: Srgb) -> Picture:
+    """A colour as a (3, 1, 1) picture."""
+    return np.array(color, np.float32)[:, None, None]
+
+
+def colorize(value: Field, palette: Palette) -> Picture:
+    """Map 0..1 (clipped) onto a palette, blending neighbours."""
     stops = np.linspace(0.0, 1.0, len(palette))
-    table = np.stack(
-        [np.interp(np.linspace(0.0, 1.0, 512), stops, [color[c] for color in palette]) for c in range(3)], -1
-    ).astype(np.float32)
-    index = np.clip(value * np.float32(511) + np.float32(0.5), 0, 511).astype(np.int32)
-    return table[index]
+    fine = np.linspace(0.0, 1.0, 512)
+    table = np.array([np.interp(fine, stops, [color[c] for color in palette]) for c in range(3)], np.float32)
+    index = (np.clip(value, 0, 1) * np.float32(511) + np.float32(0.5)).astype(np.int32)
+    return np.take(table, index, axis=1)
 
 
-def flat_colors(index: NDArray[np.integer], palette: Palette) -> Field:  # type: ignore[type-arg]
-    """(H, W) indices to the palette's colours (H, W, 3)."""
-    return np.array(palette, np.float32)[index]
+def flat_colors(index: NDArray[np.integer[Any]], colors: Palette | NDArray[np.float32]) -> Picture:
+    """Look up (H, W) indices among colours (N, 3)."""
+    table = np.ascontiguousarray(np.array(colors, np.float32).T)
+    return np.take(table, index, axis=1)
 
 
 def smooth_step(value: Field, edge: float, width: float) -> Field:
@@ -130,20 +151,29 @@ def smooth_step(value: Field, edge: float, width: float) -> Field:
     return t * t * (3 - 2 * t)
 
 
-def mix(below: Field, above: Field, cover: Field) -> Field:
-    """`above` painted over `below` (both (H, W, 3)) with an opacity (H, W)."""
-    return below + (above - below) * cover[..., None]
+def mix(below: Picture, above: Picture, cover: Field) -> Picture:
+    """`above` painted over `below` with an opacity (H, W)."""
+    return below + (above - below) * cover
 
 
-def finish(picture: Field, rng: np.random.Generator, grain: float) -> NDArray[np.uint8]:
-    """Add fine detail and round to bytes.
+def finish(picture: Picture, rng: np.random.Generator, grain: float) -> NDArray[np.uint8]:
+    """Add fine detail and round to bytes, (H, W, 3).
 
     `grain` is the standard deviation of the noise relative to the brightness: detail at the scale of one
     and two pixels, which is what stereo matching lives on where a pattern has none.
     """
-    height, width = picture.shape[:2]
-    fine = rng.standard_normal((height, width), dtype=np.float32)
-    coarse = fine + np.roll(fine, 1, 0) + np.roll(fine, 1, 1) + np.roll(fine, (1, 1), (0, 1))
-    noise = np.float32(0.6) * fine + np.float32(0.4) * coarse
-    grained = (picture + 12) * (1 + np.float32(grain) * noise)[..., None] - 12
-    return np.clip(grained + np.float32(0.5), 0, 255).astype(np.uint8)
+    fine = rng.standard_normal(picture.shape[1:], dtype=np.float32)
+    noise = fine + np.roll(fine, 1, 0)
+    noise += np.roll(noise, 1, 1)
+    noise *= np.float32(0.4 * grain)
+    noise += np.float32(0.6 * grain) * fine
+    noise += 1
+    # A little grain in the blacks too.
+    return to_bytes((picture + np.float32(12)) * noise - np.float32(12))
+
+
+def to_bytes(picture: Picture) -> NDArray[np.uint8]:
+    """Round to (H, W, 3) uint8."""
+    rounded = picture + np.float32(0.5)
+    np.clip(rounded, 0, 255, out=rounded)
+    return np.ascontiguousarray(rounded.astype(np.uint8).transpose(1, 2, 0))

@@ -189,7 +189,7 @@ def _ground(rng: np.random.Generator, rig: _Rig, materials: list[Material]) -> t
     hump_m = float(terrain.height(around).max()) * half_m
     below_m = rig.nearest_m * (max(drop, 0.1) * uniform(rng, 1.3, 3.5) + 0.3) + hump_m
     near_px = rig.camera.focal_px / (3 * rig.nearest_m)
-    materials.append(sample_material(rng, half_m * near_px, 1024))
+    materials.append(sample_material(rng, half_m * near_px, 512))
     motion = Trajectory.static((0.0, 0.0, -below_m - terrain.middle_height() * half_m))
     return SceneObject("ground", terrain, len(materials) - 1, motion, (half_m, half_m, half_m)), terrain
 
@@ -216,8 +216,8 @@ def _background(
     half_m = rig.farthest_m
     first = len(materials)
     typical_px = 0.08 * rig.camera.width
-    for _ in range(integer(rng, *rig.config.background_materials)):
-        materials.append(sample_material(rng, typical_px))
+    kinds = integer(rng, *rig.config.background_materials)
+    materials.extend(sample_material(rng, typical_px) for _ in range(kinds))
     things = []
     for index in range(integer(rng, *rig.config.background_objects)):
         depth_m = rig.depth(uniform(rng, *rig.config.background_disparity_share))

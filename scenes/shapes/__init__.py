@@ -5,5 +5,5 @@ import sys
 from scenes.discovery import concrete_subclasses
 from scenes.spec import Shape
 
-SHAPES: dict[str, type[Shape]] = concrete_subclasses(sys.modules[__name__], Shape)
+SHAPES: dict[str, type[Shape]] = concrete_subclasses(sys.modules[__name__], Shape)  # type: ignore[type-abstract]
 """Every shape by class name."""

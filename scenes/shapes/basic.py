@@ -26,7 +26,8 @@ def cube_grid(cells: int) -> tuple[Vertices, Triangles]:
     a, b = np.meshgrid(line, line, indexing="ij")
     face = np.stack([a, b, np.ones_like(a)], -1).reshape(-1, 3)
     triangles = grid_triangles(cells + 1, cells + 1)
-    sides, faces = [], []
+    sides: list[Vertices] = []
+    faces: list[Triangles] = []
     for axis in range(3):
         turned = np.roll(face, axis, axis=1)
         for sign in (1.0, -1.0):
@@ -43,7 +44,7 @@ class Plane(Shape):
     popularity: ClassVar[float] = 0.0
 
     @classmethod
-    def sample(cls, rng: np.random.Generator) -> Self:
+    def sample(cls, rng: np.random.Generator) -> Self:  # noqa: ARG003
         return cls()
 
     def mesh(self) -> Mesh:
@@ -112,7 +113,7 @@ class Ellipsoid(Shape):
 
     def mesh(self) -> Mesh:
         vertices, triangles = icosphere(3)
-        return solid(vertices * self.radii, triangles, smooth=True, crease_deg=180.0)
+        return solid(vertices * self.radii, triangles, smooth=True, crease_deg=None)
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ class Blob(Shape):
         sphere, triangles = icosphere(4)
         noise = wave_noise(np.random.default_rng(self.seed), sphere, self.frequency, self.slope)
         swollen = sphere * np.exp(self.amplitude * noise)[:, None]
-        return solid(swollen * self.radii, triangles, smooth=True, crease_deg=180.0)
+        return solid(swollen * self.radii, triangles, smooth=True, crease_deg=None)
 
 
 @dataclass(frozen=True)

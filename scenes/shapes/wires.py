@@ -74,7 +74,7 @@ class TorusKnot(Shape):
             [reach * np.cos(self.p * t), reach * np.sin(self.p * t), self.ring * np.sin(self.q * t)], -1
         )
         vertices, triangles, uv = tube(path, np.full(len(t), self.tube_radius), 12, closed=True)
-        return solid(vertices, triangles, uv=uv, smooth=True)
+        return solid(vertices, triangles, uv=uv, smooth=True, crease_deg=None)
 
 
 @dataclass(frozen=True)

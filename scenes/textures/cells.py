@@ -16,6 +16,7 @@ from scenes.painting import (
     colorize,
     finish,
     mix,
+    paint,
     sample_palette,
     smooth_step,
     spectral_noise,
@@ -33,23 +34,30 @@ def nearest_seeds(
     Returns the index of the nearest point, the distance to it and that to the second nearest, in grid
     steps. Only the 3 x 3 neighbouring grid cells are searched.
     """
-    points = (0.5 + jitter * rng.uniform(-0.5, 0.5, (2, cells, cells))).astype(np.float32)
-    x, y = x * cells, y * cells
-    column, row = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
-    x, y = x - column, y - row
+    points = 0.5 + jitter * rng.uniform(-0.5, 0.5, (2, cells, cells))
+    # Absolute positions with a margin of one cell on every side, so that neighbours need no wrapping.
+    step = np.arange(-1, cells + 1)
+    px = np.pad(points[0], 1, mode="wrap") + step[None, :]
+    py = np.pad(points[1], 1, mode="wrap") + step[:, None]
+    px, py = px.astype(np.float32).ravel(), py.astype(np.float32).ravel()
+    x, y = x % 1 * np.float32(cells), y % 1 * np.float32(cells)
+    column = np.minimum(x.astype(np.int32), cells - 1)
+    row = np.minimum(y.astype(np.int32), cells - 1)
+    middle = (row + 1) * (cells + 2) + column + 1
     first = np.full(x.shape, np.inf, np.float32)
     second = first.copy()
-    nearest = np.zeros(x.shape, np.int32)
+    nearest = middle.copy()
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
-            index = (row + dy) % cells * cells + (column + dx) % cells
-            px, py = points[0].ravel()[index], points[1].ravel()[index]
-            squared = (px + dx - x) ** 2 + (py + dy - y) ** 2
+            index = middle + (dy * (cells + 2) + dx)
+            squared = (px[index] - x) ** 2 + (py[index] - y) ** 2
             closer = squared < first
-            second = np.where(closer, first, np.minimum(second, squared))
-            nearest = np.where(closer, index, nearest)
-            first = np.where(closer, squared, first)
-    return nearest, np.sqrt(first), np.sqrt(second)
+            np.copyto(nearest, index, where=closer)
+            np.minimum(second, np.maximum(first, squared), out=second)
+            np.minimum(first, squared, out=first)
+    inner_row, inner_column = np.divmod(nearest, cells + 2)
+    cell = (inner_row - 1) % cells * cells + (inner_column - 1) % cells
+    return cell.astype(np.int32), np.sqrt(first), np.sqrt(second)
 
 
 @dataclass(frozen=True)
@@ -94,10 +102,10 @@ class VoronoiCells(Texture):
         nearest, first, second = nearest_seeds(rng, x, y, self.cells, self.jitter)
         place = rng.uniform(0.0, 1.0, self.cells**2).astype(np.float32)[nearest]
         picture = colorize(place, self.palette)
-        picture = picture * (1 + np.float32(0.12) * spectral_noise(rng, self.size, 0.9, 3))[..., None]
+        picture = picture * (1 + np.float32(0.12) * spectral_noise(rng, self.size, 0.9, 3))
         if self.joint_width > 0:
             cover = 1 - smooth_step(second - first, self.joint_width, self.joint_width * 0.6)
-            picture = mix(picture, np.array(self.joint, np.float32), cover)
+            picture = mix(picture, paint(self.joint), cover)
         return finish(picture, rng, self.grain)
 
 
@@ -141,8 +149,8 @@ class Cobblestones(Texture):
         angle = np.radians(self.light_deg)
         shading = (slope_x * np.float32(np.cos(angle)) + slope_y * np.float32(np.sin(angle))) * self.size / 40
         tone = rng.uniform(0.0, 1.0, self.cells**2).astype(np.float32)[nearest]
-        tone = np.clip(tone + np.float32(0.15) * spectral_noise(rng, self.size, 0.8, 3), 0, 1)
+        tone = tone + np.float32(0.15) * spectral_noise(rng, self.size, 0.8, 3)
         light = np.clip(1 + np.float32(0.6) * np.tanh(shading), 0.2, 2.0)
         light = light * (np.float32(0.25) + np.float32(0.75) * smooth_step(gap, 0.1, 0.16))
         stains = 0.8 + np.float32(0.4) * to_unit(spectral_noise(rng, self.size, 1.2, 1))
-        return finish(colorize(tone, self.palette) * (light * stains)[..., None], rng, self.grain)
+        return finish(colorize(tone, self.palette) * (light * stains), rng, self.grain)

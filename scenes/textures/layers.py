@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.drawing import chance, choose, log_uniform, new_seed, uniform
-from scenes.painting import finish, mix, smooth_step, spectral_noise
+from scenes.painting import mix, smooth_step, spectral_noise, to_bytes
 from scenes.spec import Texture
 from scenes.textures import cells, marks, noise, plain, tiles
 
@@ -76,5 +76,8 @@ class Layered(Texture):
         mask = smooth_step(patches, float(np.quantile(patches, 1 - self.cover)), self.softness)
         # The layer on top throws a thin shadow on the one below.
         shadow = 1 - np.float32(0.45) * np.roll(mask, (2, 2), (0, 1)) * (1 - mask)
-        below = self.below.image().astype(np.float32) * shadow[..., None]
-        return finish(mix(below, self.above.image().astype(np.float32), mask), rng, 0.02)
+        below, above = (
+            layer.image().transpose(2, 0, 1).astype(np.float32, order="C")
+            for layer in (self.below, self.above)
+        )
+        return to_bytes(mix(below * shadow, above, mask))

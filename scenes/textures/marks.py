@@ -13,10 +13,12 @@ from scenes.drawing import chance, choose, integer, log_uniform, new_seed, unifo
 from scenes.painting import (
     Field,
     Palette,
+    Picture,
     colorize,
     finish,
     flat_colors,
     mix,
+    paint,
     sample_palette,
     smooth_step,
     spectral_noise,
@@ -26,40 +28,38 @@ from scenes.painting import (
 from scenes.spec import Texture
 
 
-def stamp_shapes(
-    rng: np.random.Generator,
-    picture: Field,
-    colors: NDArray[np.float32],
-    radii: NDArray[np.float64],
-    corners: int,
-    detail: Field,
-) -> None:
-    """Paint discs (corners 0), polygons or mixtures (-1) over a periodic picture, in place.
+def heap_of_figures(
+    rng: np.random.Generator, size: int, radii: NDArray[np.float64], corners: int
+) -> tuple[NDArray[np.int16], Field]:
+    """Discs (corners 0), polygons or mixtures (-1) dropped on a periodic picture one after the other.
 
-    `colors` (N, 3), `radii` (N,) in pixels. Each figure has its own squeeze, direction, gradient and piece of
-    the noise `detail`, as each leaf of a heap has.
+    `radii` (N,) in pixels. Returns which figure is on top at each pixel, counted from 1 (0: none), and a
+    gradient across each figure, -1..1 in a direction of its own.
     """
-    size = len(picture)
+    top = np.zeros((size, size), np.int16)
     centres = rng.integers(0, size, (len(radii), 2))
-    shifts = rng.integers(0, size, (len(radii), 2))
     angles = rng.uniform(0.0, 2 * np.pi, len(radii))
     squeezes = rng.uniform(0.4, 1.0, len(radii))
     kinds = rng.choice([0, 3, 4, 4, 5, 6], len(radii)) if corners < 0 else np.full(len(radii), corners)
-    ramps = rng.normal(0.0, 0.25, len(radii))
+    cosines, sines = np.cos(angles), np.sin(angles)
     for i, radius in enumerate(radii):
-        reach = int(np.ceil(radius)) + 1
-        offset = np.arange(-reach, reach + 1)
-        x, y = offset[None, :].astype(np.float32), offset[:, None].astype(np.float32)
-        cos, sin = np.float32(np.cos(angles[i])), np.float32(np.sin(angles[i]))
-        u = (cos * x + sin * y) / np.float32(radius)
-        v = (cos * y - sin * x) / np.float32(radius * squeezes[i])
+        reach = int(np.ceil(radius))
+        offset = np.arange(-reach, reach + 1, dtype=np.float32) / np.float32(radius)
+        across, down = offset[None, :], offset[:, None]
+        u = cosines[i].astype(np.float32) * across + sines[i].astype(np.float32) * down
+        v = cosines[i].astype(np.float32) * down - sines[i].astype(np.float32) * across
+        v /= np.float32(squeezes[i])
         inside = _figure(u, v, int(kinds[i])) <= 1
-        rows, columns = (centres[i, 0] + offset) % size, (centres[i, 1] + offset) % size
-        piece = detail[np.ix_((rows + shifts[i, 0]) % size, (columns + shifts[i, 1]) % size)]
-        shade = 1 + np.float32(ramps[i]) * u + piece
+        rows = np.arange(centres[i, 0] - reach, centres[i, 0] + reach + 1) % size
+        columns = np.arange(centres[i, 1] - reach, centres[i, 1] + reach + 1) % size
         target = np.ix_(rows, columns)
-        patch = picture[target]
-        picture[target] = np.where(inside[..., None], colors[i] * shade[..., None], patch)
+        top[target] = np.where(inside, np.int16(i + 1), top[target])
+    owner = np.maximum(top - 1, 0)
+    x, y = np.meshgrid(np.arange(size), np.arange(size))
+    dx = (x - centres[owner, 1] + size // 2) % size - size // 2
+    dy = (y - centres[owner, 0] + size // 2) % size - size // 2
+    ramp = (dx * cosines[owner] + dy * sines[owner]) / radii[owner]
+    return top, (ramp * (top > 0)).astype(np.float32)
 
 
 def _figure(u: Field, v: Field, corners: int) -> Field:
@@ -113,13 +113,18 @@ class DeadLeaves(Texture):
         share = rng.uniform(0.0, 1.0, self.figures)
         radii = (low**-2 + share * (high**-2 - low**-2)) ** -0.5
         # Small figures on a heap of big ones; a heap the other way round shows only the big ones.
-        radii[: self.figures // 4] = rng.uniform(0.4 * high, high, self.figures // 4)
-        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.figures)]
-        colors *= rng.uniform(0.7, 1.25, (self.figures, 1)).astype(np.float32)
-        detail = np.float32(0.13) * spectral_noise(rng, self.size, 0.8, 4)
-        picture = np.tile(np.array(self.palette[0], np.float32), (self.size, self.size, 1))
-        stamp_shapes(rng, picture, colors, radii, self.corners, detail)
-        return finish(picture, rng, self.grain)
+        big = self.figures // 6
+        radii[:big] = rng.uniform(0.4 * high, high, big)
+        top, ramp = heap_of_figures(rng, self.size, radii, self.corners)
+        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.figures + 1)]
+        colors *= rng.uniform(0.7, 1.25, (self.figures + 1, 1)).astype(np.float32)
+        slopes = rng.normal(0.0, 0.25, self.figures + 1).astype(np.float32)
+        # Each figure shows its own piece of the noise, as each leaf has its own veins.
+        noise = spectral_noise(rng, self.size, 0.8, 4).ravel()
+        shift = rng.integers(0, self.size**2, self.figures + 1)[top].ravel()
+        detail = noise[(np.arange(self.size**2) + shift) % self.size**2].reshape(top.shape)
+        light = 1 + slopes[top] * ramp + np.float32(0.13) * detail
+        return finish(flat_colors(top, colors) * light, rng, self.grain)
 
 
 @dataclass(frozen=True)
@@ -150,15 +155,14 @@ class BlurredShapes(Texture):
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
         size = self.size
-        picture = np.tile(np.array(self.palette[0], np.float32), (size, size, 1))
         radii = size * np.exp(rng.uniform(np.log(0.03), np.log(0.18), self.figures))
-        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.figures)]
-        stamp_shapes(rng, picture, colors, radii, -1, np.zeros((size, size), np.float32))
+        top, _ = heap_of_figures(rng, size, radii, -1)
+        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.figures + 1)]
         fy, fx = fft.fftfreq(size).astype(np.float32), fft.rfftfreq(size).astype(np.float32)
         gain = np.exp(-2 * (np.pi * self.blur * size) ** 2 * (fx[None, :] ** 2 + fy[:, None] ** 2))
-        spectrum = fft.rfft2(picture, axes=(0, 1)) * gain.astype(np.float32)[..., None]
-        blurred: Field = fft.irfft2(spectrum, s=(size, size), axes=(0, 1))
-        blurred *= (1 + np.float32(0.1) * spectral_noise(rng, size, 0.8, 3))[..., None]
+        spectrum = fft.rfft2(flat_colors(top, colors)) * gain.astype(np.float32)
+        blurred: Picture = fft.irfft2(spectrum, s=(size, size))
+        blurred *= 1 + np.float32(0.1) * spectral_noise(rng, size, 0.8, 3)
         return finish(blurred, rng, self.grain)
 
 
@@ -203,8 +207,7 @@ class GlyphRows(Texture):
         column, row = (x * (6 * self.letters)).astype(np.int32), (y * (10 * self.lines)).astype(np.int32)
         letter = text[row // 10 % self.lines, column // 6 % self.letters]
         on = glyphs[letter, row % 10, column % 6]
-        paper = np.array(self.palette[0], np.float32)
-        paper = paper * (1 + np.float32(0.06) * spectral_noise(rng, self.size, 1.0, 1))[..., None]
+        paper = paint(self.palette[0]) * (1 + np.float32(0.06) * spectral_noise(rng, self.size, 1.0, 1))
         ink = flat_colors(inks[row // 10 % self.lines], self.palette)
         return finish(mix(paper, ink, on * np.float32(0.92)), rng, self.grain)
 
@@ -263,16 +266,15 @@ class Facade(Texture):
         edge = np.maximum(across, up)
         opening = (edge < 1).astype(np.float32)
         pane = ((edge < 0.85) & (np.minimum(across, up) > 0.06)).astype(np.float32)
-        wall = np.array(self.palette[0], np.float32)
-        stains = np.clip(1 + np.float32(0.16) * spectral_noise(rng, self.size, 1.1, 1), 0.3, 1.7)[..., None]
+        stains = np.clip(1 + np.float32(0.16) * spectral_noise(rng, self.size, 1.1, 1), 0.3, 1.7)
         lit = rng.uniform(0.0, 1.0, (self.floors, self.bays)).astype(np.float32)[floor, bay]
-        glass = colorize(np.clip(lit + np.float32(0.3) * (v % 1 - np.float32(0.5)), 0, 1), self.palette[2:])
+        glass = colorize(lit + np.float32(0.3) * (v % 1 - np.float32(0.5)), self.palette[2:])
         reflections = np.float32(0.6) + np.float32(0.8) * to_unit(spectral_noise(rng, self.size, 1.4, 3))
         # A darker line under each window: the sill's shadow.
         sill = smooth_step(v % 1, 0.5 + self.window[1] / 2, 0.01) * (v % 1 < 0.56 + self.window[1] / 2)
-        wall = wall * stains * (1 - np.float32(0.4) * sill * (across < 1.1))[..., None]
-        picture = mix(wall, np.array(self.palette[1], np.float32) * stains, opening)
-        picture = mix(picture, glass * reflections[..., None], pane)
+        wall = paint(self.palette[0]) * (stains * (1 - np.float32(0.4) * sill * (across < 1.1)))
+        picture = mix(wall, paint(self.palette[1]) * stains, opening)
+        picture = mix(picture, glass * reflections, pane)
         if chance(rng, 0.5):
-            picture[(v % 1 > 0.965)] *= np.float32(0.6)
+            picture *= 1 - np.float32(0.4) * (v % 1 > 0.965)
         return finish(picture, rng, self.grain)

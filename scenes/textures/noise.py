@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from scenes.drawing import choose, integer, log_uniform, new_seed, uniform
 from scenes.painting import (
-    Field,
     Palette,
     Srgb,
     colorize,
     finish,
     mix,
+    paint,
     sample_palette,
     smooth_step,
     spectral_noise,
@@ -93,8 +93,7 @@ class NaturalSpectrum(Texture):
         rng = np.random.default_rng(self.seed)
         light = np.exp(np.float32(self.contrast) * spectral_noise(rng, self.size, self.slope, 2))
         hue = to_unit(2 * spectral_noise(rng, self.size, self.slope + 0.3, 2))
-        mean, tint = np.array(self.mean, np.float32), np.array(self.tint, np.float32)
-        picture = (mean + (tint - mean) * hue[..., None]) * light[..., None]
+        picture = mix(paint(self.mean), paint(self.tint), hue) * light
         return finish(picture, rng, self.grain)
 
 
@@ -138,7 +137,7 @@ class Labyrinth(Texture):
         figure = smooth_step(band, self.balance, 0.35)
         shades = spectral_noise(rng, self.size, 1.0, 2)
         ground = colorize(to_unit(shades), self.palette[:2])
-        ink = np.array(self.palette[2], np.float32) * (1 + np.float32(0.15) * shades)[..., None]
+        ink = paint(self.palette[2]) * (1 + np.float32(0.15) * shades)
         return finish(mix(ground, ink, figure), rng, self.grain)
 
 
@@ -174,7 +173,7 @@ class Marble(Texture):
         bend = np.float32(self.turbulence) * spectral_noise(rng, self.size, self.slope, 1)
         layers = 0.5 + 0.5 * np.sin(np.float32(2 * np.pi) * (self.cycles[0] * x + self.cycles[1] * y + bend))
         grit = np.float32(0.08) * spectral_noise(rng, self.size, 0.6, 6)
-        return finish(colorize(np.clip(layers + grit, 0, 1), self.palette), rng, self.grain)
+        return finish(colorize(layers + grit, self.palette), rng, self.grain)
 
 
 @dataclass(frozen=True)
@@ -204,8 +203,7 @@ class WoodPlanks(Texture):
 
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
-        x, y = unit_grid(self.size)
-        across = x * self.planks
+        across = unit_grid(self.size)[0] * self.planks
         board = across.astype(np.int32) % self.planks
         # Each board shows its own part of the noise: rows shifted by a board's own offset.
         offset = rng.integers(0, self.size, self.planks)[board[0]]
@@ -218,5 +216,5 @@ class WoodPlanks(Texture):
         tone = 1 + np.float32(0.15) * rng.standard_normal(self.planks).astype(np.float32)[board]
         edge = np.minimum(across % 1, 1 - across % 1)
         joint = 1 - np.float32(0.6) * (1 - smooth_step(edge, 0.012 * self.planks, 0.012 * self.planks))
-        picture: Field = colorize(np.clip(value, 0, 1), self.palette) * (tone * joint)[..., None]
+        picture = colorize(value, self.palette) * (tone * joint)
         return finish(picture, rng, self.grain)

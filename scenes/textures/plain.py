@@ -14,6 +14,7 @@ from scenes.painting import (
     Srgb,
     colorize,
     finish,
+    paint,
     sample_palette,
     spectral_noise,
     to_unit,
@@ -32,7 +33,7 @@ class SolidColor(Texture):
     popularity: ClassVar[float] = 0.0
 
     @classmethod
-    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:  # noqa: ARG003
         r, g, b = (int(value) for value in rng.integers(0, 256, 3))
         return cls(srgb=(r, g, b))
 
@@ -66,7 +67,7 @@ class NearTextureless(Texture):
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
         clouds = 1 + np.float32(self.clouds) * spectral_noise(rng, self.size, 1.5)
-        return finish(clouds[..., None] * np.array(self.color, np.float32), rng, self.grain)
+        return finish(clouds * paint(self.color), rng, self.grain)
 
 
 @dataclass(frozen=True)
@@ -102,5 +103,5 @@ class Gradient(Texture):
         phase = phase + np.float32(self.waviness) * spectral_noise(rng, self.size, 2.0)
         ramp = np.abs(2 * (phase % 1) - 1)
         detail = to_unit(spectral_noise(rng, self.size, 0.8, 4)) - np.float32(0.5)
-        picture = colorize(np.clip(ramp, 0, 1), self.palette) * (1 + np.float32(0.25) * detail)[..., None]
+        picture = colorize(ramp, self.palette) * (1 + np.float32(0.25) * detail)
         return finish(picture, rng, self.grain)

@@ -9,7 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.drawing import choose, new_seed, uniform
-from scenes.painting import Field, Srgb, mix, oklch_to_srgb, smooth_step, spectral_noise
+from scenes.painting import (
+    Field,
+    Picture,
+    Srgb,
+    mix,
+    oklch_to_srgb,
+    paint,
+    smooth_step,
+    spectral_noise,
+    to_bytes,
+)
 from scenes.spec import Texture
 
 
@@ -63,32 +73,30 @@ class Sky(Texture):
 
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
-        height, width = self.size // 2, self.size
-        elevation = (np.float32(np.pi) * (0.5 - (np.arange(height, dtype=np.float32) + 0.5) / height))[
-            :, None
-        ]
-        elevation = np.broadcast_to(elevation, (height, width)).astype(np.float32)
-        azimuth = np.float32(2 * np.pi) * (np.arange(width, dtype=np.float32) + np.float32(0.5)) / width
-        up = np.clip(np.sin(elevation), 0, 1)
-        zenith, horizon, ground, cloud = (
-            np.array(color, np.float32) for color in (self.zenith, self.horizon, self.ground, self.cloud)
+        half, width = self.size // 4, self.size
+        # Rows from the zenith down to the horizon, columns once around.
+        step = np.float32(np.pi / 2 / half)
+        elevation = np.float32(np.pi / 2) - step * (
+            np.arange(half, dtype=np.float32)[:, None] + np.float32(0.5)
         )
-        sky = mix(horizon, zenith, up ** np.float32(0.55))
-        sky = self._clouds(rng, sky, cloud, up)
-        sun_height = np.radians(self.sun_elevation_deg)
-        cosine = np.sin(elevation) * np.sin(sun_height) + np.cos(elevation) * np.cos(sun_height) * np.cos(
-            azimuth - 2 * np.pi * self.sun_azimuth
-        )
-        halo = np.exp((cosine - 1) * 8) * 0.5 + np.exp((cosine - 1) * 120)
-        sky = mix(sky, np.float32(255.0), (self.glow * np.clip(halo, 0, 1)).astype(np.float32))
-        land = ground * (1 + np.float32(0.15) * spectral_noise(rng, (height, width), 1.0, 4))[..., None]
-        picture = mix(land, sky, smooth_step(elevation, 0.0, 0.02))
-        return np.clip(picture + np.float32(0.5), 0, 255).astype(np.uint8)
+        azimuth = step * (np.arange(width, dtype=np.float32)[None, :] + np.float32(0.5))
+        up = np.sin(elevation)
+        sky = mix(paint(self.horizon), paint(self.zenith), up ** np.float32(0.55))
+        sky = self._clouds(rng, sky, up, width)
+        sun_height = np.float32(np.radians(self.sun_elevation_deg))
+        around = np.cos(azimuth - np.float32(2 * np.pi * self.sun_azimuth))
+        cosine = up * np.sin(sun_height) + np.cos(elevation) * np.cos(sun_height) * around
+        halo = np.float32(0.5) * np.exp((cosine - 1) * 8) + np.exp((cosine - 1) * 120)
+        sky = mix(sky, paint((255, 255, 255)), np.float32(self.glow) * np.clip(halo, 0, 1))
+        # Land below the horizon is only seen in reflections and as light from below.
+        return to_bytes(np.concatenate([sky, np.broadcast_to(paint(self.ground), sky.shape)], axis=1))
 
-    def _clouds(self, rng: np.random.Generator, sky: Field, cloud: Field, up: Field) -> Field:
-        """Clouds, drawn out near the horizon, darker underneath."""
-        shape = (len(up), up.shape[1])
-        field = spectral_noise(rng, shape, 1.4, 4, stretch=(1.0, 0.35))
-        density = smooth_step(field, 1.6 - 3.0 * self.cloud_cover, 1.2) * smooth_step(up, 0.08, 0.16)
-        light = 1 - np.float32(0.22) * smooth_step(np.roll(field, -3, axis=0), 0.6, 2.0)
-        return mix(sky, cloud * light[..., None], density * np.float32(0.9))
+    def _clouds(self, rng: np.random.Generator, sky: Picture, up: Field, width: int) -> Picture:
+        """Clouds, smaller and denser towards the horizon, darker underneath."""
+        rows = len(up)
+        noise = spectral_noise(rng, (2 * rows, width), 1.6, 5, stretch=(1.0, 0.8))
+        # A layer of clouds in perspective: near the horizon, rows of the noise pass ever faster.
+        field = noise[(rows * (1 - up[:, 0]) ** np.float32(0.6)).astype(np.int32)]
+        density = smooth_step(field, 1.8 - 3.2 * self.cloud_cover, 1.0) * smooth_step(up, 0.03, 0.12)
+        light = 1 - np.float32(0.2) * smooth_step(np.roll(field, -3, axis=0), 0.4, 1.8)
+        return mix(sky, paint(self.cloud) * light, density * np.float32(0.9))

@@ -17,6 +17,7 @@ from scenes.painting import (
     finish,
     flat_colors,
     mix,
+    paint,
     sample_palette,
     smooth_step,
     spectral_noise,
@@ -27,9 +28,9 @@ from scenes.spec import Texture
 
 
 def _wear(rng: np.random.Generator, size: int, strength: float) -> Field:
-    """(H, W, 1) slow and fine variations of brightness about 1, as use and weather leave them."""
+    """(H, W) slow and fine variations of brightness about 1, as use and weather leave them."""
     noise = spectral_noise(rng, size, 1.0, 1)
-    return np.clip(1 + np.float32(strength) * noise, 0.2, 1.8)[..., None]
+    return np.clip(1 + np.float32(strength) * noise, 0.2, 1.8)
 
 
 @dataclass(frozen=True)
@@ -74,11 +75,11 @@ class Bricks(Texture):
         u = (x + wobble) * self.columns + np.float32(self.bond) * (row % 2)
         column = np.floor(u).astype(np.int32) % self.columns
         tone = rng.uniform(0.0, 1.0, (self.rows, self.columns)).astype(np.float32)[row, column]
-        tone = np.clip(tone + np.float32(0.1) * spectral_noise(rng, self.size, 0.8, 4), 0, 1)
+        tone = tone + np.float32(0.1) * spectral_noise(rng, self.size, 0.8, 4)
         across = np.minimum(u % 1, 1 - u % 1) * np.float32(self.rows / self.columns)
         edge = np.minimum(across, np.minimum(v % 1, 1 - v % 1))
         face = smooth_step(edge, self.joint / 2, self.joint * 0.5)
-        picture = mix(np.array(self.mortar, np.float32), colorize(tone, self.palette), face)
+        picture = mix(paint(self.mortar), colorize(tone, self.palette), face)
         return finish(picture * _wear(rng, self.size, 0.12), rng, self.grain)
 
 
@@ -195,11 +196,11 @@ class Plaid(Texture):
         rng = np.random.default_rng(self.seed)
         count = len(self.bands)
         place = (np.arange(self.size) * count * self.repeats // self.size) % count
-        color = np.array(self.palette, np.float32)[np.array(self.bands)[place]]
+        thread = np.array(self.bands)[place]
         pixel = np.arange(self.size) // self.thread
         # Two over, two under, one thread further in each row.
         over = ((pixel[:, None] + pixel[None, :]) % 4 < 2).astype(np.float32)
-        weft, warp = np.broadcast_arrays(color[:, None], color[None, :])
+        weft, warp = flat_colors(thread[:, None], self.palette), flat_colors(thread[None, :], self.palette)
         picture = mix(warp, weft, np.float32(0.2) + np.float32(0.6) * over)
         return finish(picture * _wear(rng, self.size, 0.08), rng, self.grain)
 
@@ -248,7 +249,7 @@ class Dots(Texture):
             cover = cover * smooth_step(reach, self.radius * self.ring, soft)
         kinds = rng.integers(1, len(self.palette), (self.columns, self.columns))
         dots = flat_colors(kinds[row % self.columns, column], self.palette)
-        ground = np.array(self.palette[0], np.float32) * _wear(rng, self.size, 0.1)
+        ground = paint(self.palette[0]) * _wear(rng, self.size, 0.1)
         return finish(mix(ground, dots, cover), rng, self.grain)
 
 
@@ -291,4 +292,4 @@ class Weave(Texture):
         light = (np.float32(0.25) + np.float32(0.75) * height * band) * (
             np.float32(0.75) + np.float32(0.5) * tones
         )
-        return finish(color * np.clip(light, 0.08, 1.3)[..., None], rng, self.grain)
+        return finish(color * np.clip(light, 0.08, 1.3), rng, self.grain)
