@@ -27,12 +27,12 @@ CONSISTENCY_TOLERANCE_PX = 0.25
 """How far a visible pixel's disparity may lie outside those of the two pixels it falls between."""
 NEARER_PX = 1e-2
 """What hides a point has a disparity greater than the point's by more than this."""
-MAX_INCONSISTENT = 0.03
+MAX_INCONSISTENT = 0.01
 """Share of pixels whose two views may disagree."""
 FRAME_TIE_PX = 1e-3
 """A point this close to the other frame's edge may be labelled either way."""
 GEOMETRY_TOLERANCE_PX = 1e-2
-MAX_OFF_GEOMETRY = 0.02
+MAX_OFF_GEOMETRY = 0.01
 """Share of sampled pixels that may differ from the scene's geometry by more than the tolerance."""
 MIN_COUNTED = 50
 """Shares of fewer pixels than this say nothing."""

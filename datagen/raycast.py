@@ -9,10 +9,9 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from datagen.ground_truth import RectifiedPair, to_camera_frame
+from datagen.ground_truth import RectifiedPair
 from datagen.layout import Eye
 from scenes import Scene
-from scenes.mesh import Mesh
 
 
 @dataclass(frozen=True)
@@ -26,46 +25,59 @@ class Hits:
 
 
 class SceneRayCaster:
-    """Casts rays from either eye at the triangles of a scene, whose meshes are built once."""
+    """Casts rays from either eye at the triangles of a scene.
+
+    Meshes are built once; they stand in the left eye's frame, where 32 bits lose least.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        camera = scene.camera
-        self._pair = RectifiedPair(camera.width, camera.height, camera.focal_px, camera.baseline_m)
-        self._meshes: list[Mesh] = [thing.shape.mesh() for thing in scene.objects]
+        self._meshes = [thing.shape.mesh() for thing in scene.objects]
+        first_vertex = np.cumsum([0, *(len(mesh.vertices) for mesh in self._meshes)])
+        self._triangles = np.concatenate(
+            [np.zeros((0, 3), np.int32)]
+            + [mesh.triangles + first for mesh, first in zip(self._meshes, first_vertex, strict=False)]
+        ).astype(np.int32)
+        """(T, 3) indices into the vertices of all meshes."""
         self._owners = np.repeat(np.arange(len(self._meshes)), [len(mesh.triangles) for mesh in self._meshes])
+        self._instant: float | None = None
 
     def cast(self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Hits:
         """First hits through the centres of the pixels (rows, columns), both (N,).
 
         Embree finds the triangle in 32 bits; the distance to its plane is then computed in 64 bits.
         """
-        directions = self._pair.rays()[rows, columns]
+        camera = self._scene.camera
+        pair = RectifiedPair(camera.width, camera.height, camera.focal_px, camera.baseline_m)
+        directions = pair.rays()[rows, columns]
+        origin = np.array([0.0 if eye == "left" else camera.baseline_m, 0.0, 0.0])
         disparity, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
-        if not len(self._owners):
+        if not len(self._triangles):
             return Hits(disparity, index)
-        triangles = to_camera_frame(self._triangles(time_frames), self._scene.camera.pose(eye, time_frames))
-        embree = EmbreeScene(robust=True)
-        # Kept in a name: the mesh must live as long as the rays are cast.
-        geometry = TriangleMesh(embree, triangles.astype(np.float32))
-        origins = np.zeros_like(directions, np.float32)
-        hit = np.asarray(embree.run(origins, directions.astype(np.float32), query="INTERSECT"), np.int64)
-        del geometry
+        if time_frames != self._instant:
+            self._place(time_frames)
+        origins = np.broadcast_to(origin, directions.shape).astype(np.float32)
+        hit = np.asarray(
+            self._embree.run(origins, directions.astype(np.float32), query="INTERSECT"), np.int64
+        )
         met = hit >= 0
-        corners = triangles[hit[met]]
+        corners = self._vertices[self._triangles[hit[met]]] - origin
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # depth = n.v / n.r with a ray r of unit length along the axis, and disparity = fB / depth.
-        inverse_depth = np.einsum("ij,ij->i", normals, directions[met]) / np.einsum(
-            "ij,ij->i", normals, corners[:, 0]
-        )
-        disparity[met] = self._scene.camera.disparity_metres * inverse_depth
+        along = np.einsum("ij,ij->i", normals, directions[met])
+        disparity[met] = camera.disparity_metres * along / np.einsum("ij,ij->i", normals, corners[:, 0])
         index[met] = 1 + self._owners[hit[met]]
         return Hits(disparity, index)
 
-    def _triangles(self, time_frames: float) -> NDArray[np.float64]:
-        """(T, 3, 3) corners of all objects' triangles in the world at an instant."""
-        corners = []
-        for thing, mesh in zip(self._scene.objects, self._meshes, strict=True):
-            pose = thing.pose(time_frames)
-            corners.append((mesh.vertices @ pose[:3, :3].T + pose[:3, 3])[mesh.triangles])
-        return np.concatenate(corners)
+    def _place(self, time_frames: float) -> None:
+        """Put all triangles where they are at an instant."""
+        to_left_eye = np.linalg.inv(self._scene.camera.pose("left", time_frames))
+        poses = [to_left_eye @ thing.pose(time_frames) for thing in self._scene.objects]
+        moved = [
+            mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
+            for mesh, pose in zip(self._meshes, poses, strict=True)
+        ]
+        self._vertices = np.concatenate(moved)
+        self._embree = EmbreeScene(robust=True)
+        TriangleMesh(self._embree, self._vertices.astype(np.float32), self._triangles)
+        self._instant = time_frames

@@ -27,7 +27,7 @@ from datagen.recipe import Recipe
 from scenes import Scene
 
 SAMPLED_PIXELS = 500
-"""How many random pixels of each view are compared with the scene's geometry by ray casts."""
+"""How many random pixels of each view are compared with the scene's geometry by default."""
 POSE_TOLERANCE = 1e-9
 
 
@@ -54,6 +54,7 @@ class SceneCheck:
     recipe: Recipe
     split: str
     scene: int
+    sampled_pixels: int = SAMPLED_PIXELS
     problems: list[Problem] = field(default_factory=list)
     known: set[str] = field(default_factory=set)
     """The scene's files, relative to the root."""
@@ -78,7 +79,7 @@ class SceneCheck:
         if self._are_readable([record]):
             try:
                 scene = read_scene(record)
-                self._check_contents(scene, SceneRayCaster(scene))
+                self._check_contents(scene, SceneRayCaster(scene) if self.sampled_pixels else None)
             except ValueError as error:
                 self._found(record, str(error))
         return self
@@ -120,7 +121,7 @@ class SceneCheck:
                 self._found(path, "is part of the scene but not in its manifest")
         return self._whole.issuperset(names)
 
-    def _check_contents(self, scene: Scene, caster: SceneRayCaster) -> None:
+    def _check_contents(self, scene: Scene, caster: SceneRayCaster | None) -> None:
         camera_data = self.layout.file("camera_data", self.split, self.scene)
         if self._are_readable([camera_data]):
             for message in _check_camera_data(camera_data, scene):
@@ -135,7 +136,7 @@ class SceneCheck:
         kinds += [kind for kind in TARGETS if KINDS[kind].per_eye]
         return [self.layout.file(kind, self.split, self.scene, eye, frame) for kind in kinds for eye in EYES]
 
-    def _check_frame(self, scene: Scene, caster: SceneRayCaster, instant: int) -> None:
+    def _check_frame(self, scene: Scene, caster: SceneRayCaster | None, instant: int) -> None:
         """Check the arrays of one frame, all of whose files are as they were written."""
         frame = FIRST_FRAME + instant
         folder = self.layout.scene_folder("disparity", self.split, self.scene)
@@ -157,7 +158,7 @@ class SceneCheck:
             self._found(folder, str(error))
 
     def _check_targets(
-        self, sample: StereoSample, eye: Eye, scene: Scene, caster: SceneRayCaster, instant: int
+        self, sample: StereoSample, eye: Eye, scene: Scene, caster: SceneRayCaster | None, instant: int
     ) -> Iterator[str]:
         view, other = (sample.view(eye), sample.view("right" if eye == "left" else "left"))
         yield from check_disparity(view.disparity)
@@ -166,8 +167,10 @@ class SceneCheck:
         )
         yield from check_object_index(view.object_index, view.disparity, len(scene.objects))
         yield from check_views(eye, view.disparity, other.disparity, view.occlusion)
+        if caster is None:
+            return
         rng = np.random.default_rng((self.scene, instant, EYES.index(eye)))
-        pixels = rng.integers(0, view.disparity.size, SAMPLED_PIXELS)
+        pixels = rng.integers(0, view.disparity.size, self.sampled_pixels)
         rows, columns = np.unravel_index(pixels, view.disparity.shape)
         yield from check_geometry(
             view.disparity[rows, columns],

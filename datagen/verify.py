@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from datagen.dataset import open_layout
 from datagen.layout import KINDS, SPLITS, Layout
 from datagen.recipe import Recipe, read_recipe
-from datagen.scene_check import Problem, SceneCheck
+from datagen.scene_check import SAMPLED_PIXELS, Problem, SceneCheck
+
+FEW_SCENES = 8
+"""Fewer scenes than this are checked before other processes would have started."""
 
 
 @dataclass(frozen=True)
@@ -44,19 +49,24 @@ class VerifyReport:
 
 
 def verify_dataset(
-    root: Path | str, progress: Callable[[int, int], None] | None = None, workers: int = 2
+    root: Path | str,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    workers: int | None = None,
+    sampled_pixels: int = SAMPLED_PIXELS,
 ) -> VerifyReport:
     """Check every file and every frame of a data set.
 
     Files: size and SHA-256 as in the manifest, none missing, none that belongs to nothing. Arrays: they
     decode, have the camera's size and are finite; gradients, occlusion, object index and the two views'
-    disparities agree. Geometry: poses are the scene's, and `SAMPLED_PIXELS` random pixels of each view agree
+    disparities agree. Geometry: poses are the scene's, and `sampled_pixels` random pixels of each view agree
     with rays cast at the scene's meshes.
 
     Args:
         root: The data set's folder.
         progress: Called after each scene with (scenes done, scenes in all).
-        workers: Threads; reading, hashing, decoding and array arithmetic run beside each other.
+        workers: Processes, one a core if None. Sets of under `FEW_SCENES` are checked in this process.
+        sampled_pixels: Of each view, for the rays; 0 leaves the geometry out, which is most of the time.
 
     Raises:
         DatasetError: For a folder that is missing or no data set at all, or a recipe that cannot be read.
@@ -64,25 +74,39 @@ def verify_dataset(
     start = time.perf_counter()
     layout = open_layout(root)
     recipe = read_recipe(layout.recipe)
-    scenes = [(split, scene) for split in SPLITS for scene in layout.committed_scenes(split)]
+    checks = [
+        SceneCheck(layout, recipe, split, scene, sampled_pixels)
+        for split in SPLITS
+        for scene in layout.committed_scenes(split)
+    ]
     results = []
-    with ThreadPoolExecutor(workers) as pool:
-        for result in pool.map(lambda one: SceneCheck(layout, recipe, *one).run(), scenes):
-            results.append(result)
-            if progress is not None:
-                progress(len(results), len(scenes))
+    for result in _run(checks, workers):
+        results.append(result)
+        if progress is not None:
+            progress(len(results), len(checks))
     problems = [problem for result in results for problem in result.problems]
     problems += _unfinished(layout, recipe)
     problems += _orphans(layout, (result.known for result in results))
     return VerifyReport(
         root=layout.root,
-        scenes=len(scenes),
+        scenes=len(results),
         frames=sum(result.frames for result in results),
         files=sum(result.files for result in results),
         bytes_read=sum(result.bytes_read for result in results),
         seconds=time.perf_counter() - start,
         problems=tuple(problems),
     )
+
+
+def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
+    """Run the checks, in order, on as many processes as are worth starting."""
+    workers = len(os.sched_getaffinity(0)) if workers is None else workers
+    if workers == 1 or len(checks) < FEW_SCENES:
+        yield from map(SceneCheck.run, checks)
+        return
+    # A fresh interpreter each: forking a process with threads of OpenCV or Embree in it can hang.
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(SceneCheck.run, checks)
 
 
 def _unfinished(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
