@@ -1,0 +1,232 @@
+"""The refinement against dense solutions of the energy and of Eq. 8, both built here by loops."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from refine import ConvergenceWarning, MRFParameters, SolverError, refine_disparity, solve_mrf
+from refine.metrics import forward_gradient
+from refine.weights import NEIGHBORS
+from tests.refine.oracles import dense_minimiser, dense_paper_solution
+from tests.refine.worlds import Problem, random_problem, toy_frame
+
+TIGHT = 1e-12
+DEFAULTS = MRFParameters()
+
+
+@pytest.mark.parametrize("style", ["noise", "smooth", "constant", "blocks", "mixed"])
+@pytest.mark.parametrize("solver", ["direct", "cg", "multigrid"])
+def test_exact_form_minimises_the_energy(style, solver):
+    problem = random_problem(12, 9, seed=3, style=style)
+    solution = solve_mrf(*problem.inputs, solver=solver, tolerance=TIGHT)
+    np.testing.assert_allclose(solution.disparity, dense_minimiser(problem, DEFAULTS), rtol=0, atol=1e-8)
+    assert not solution.info.fell_back
+    assert solution.info.solver == solver
+
+
+@pytest.mark.parametrize("style", ["noise", "smooth", "constant", "blocks", "mixed"])
+@pytest.mark.parametrize("solver", ["direct", "cg", "multigrid"])
+def test_paper_form_solves_equation_8(style, solver):
+    problem = random_problem(12, 9, seed=4, style=style)
+    solution = solve_mrf(*problem.inputs, form="paper", solver=solver, tolerance=TIGHT)
+    np.testing.assert_allclose(solution.disparity, dense_paper_solution(problem, DEFAULTS), rtol=0, atol=1e-8)
+    assert not solution.info.fell_back
+
+
+def test_the_two_forms_differ():
+    problem = random_problem(12, 9, seed=5)
+    exact, paper = (refine_disparity(*problem.inputs, form=form) for form in ("exact", "paper"))
+    assert np.abs(exact - paper).max() > 0.1
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    height=st.integers(1, 8),
+    width=st.integers(1, 8),
+    seed=st.integers(0, 10**6),
+    style=st.sampled_from(["noise", "smooth", "constant", "blocks", "mixed"]),
+    alpha=st.sampled_from([0.0, 1.0, 100.0]),
+    beta=st.sampled_from([0.0, 0.1, 10.0]),
+    form=st.sampled_from(["exact", "paper"]),
+)
+def test_any_size_and_weights_agree_with_the_dense_solution(height, width, seed, style, alpha, beta, form):
+    problem = random_problem(height, width, seed, style)
+    parameters = MRFParameters(alpha=alpha, beta=beta)
+    expected = {"exact": dense_minimiser, "paper": dense_paper_solution}[form](problem, parameters)
+    found = solve_mrf(*problem.inputs, parameters, form=form).disparity
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("form", ["exact", "paper"])
+@pytest.mark.parametrize("solver", ["direct", "cg", "multigrid"])
+def test_a_plane_with_its_own_gradient_is_reproduced_where_the_colour_term_allows(form, solver):
+    y, x = np.mgrid[:20, :31].astype(float)
+    plane = 5 + 0.3 * x - 0.2 * y + 10
+    gradient = np.nan_to_num(forward_gradient(plane))
+    image = np.full((20, 31, 3), 90, np.uint8)
+    confidence = np.where((x + y) % 7 == 0, 1.0, 0.0)
+    noisy = np.where(confidence > 0, plane, 50.0)
+    parameters = MRFParameters(confidence_floor=0.0)
+    found = solve_mrf(noisy, confidence, gradient, image, parameters, form, solver, TIGHT)
+    np.testing.assert_allclose(found.disparity, plane, atol=1e-7)
+
+
+@pytest.mark.parametrize("form", ["exact", "paper"])
+@pytest.mark.parametrize("style", ["noise", "blocks", "constant"])
+def test_a_constant_disparity_is_reproduced_on_any_image(form, style):
+    problem = random_problem(15, 14, seed=6, style=style)
+    constant = np.full((15, 14), 17.25)
+    refined = refine_disparity(constant, problem.confidence, np.zeros((15, 14, 2)), problem.image, form=form)
+    np.testing.assert_allclose(refined, 17.25, rtol=0, atol=1e-5)
+    assert refined.dtype == np.float32
+
+
+@pytest.mark.parametrize("form", ["exact", "paper"])
+def test_solvers_agree_on_an_image_of_some_size(form):
+    problem = random_problem(70, 90, seed=7)
+    solutions = [
+        solve_mrf(*problem.inputs, form=form, solver=solver, tolerance=1e-9)
+        for solver in ("direct", "cg", "multigrid")
+    ]
+    for solution in solutions[1:]:
+        np.testing.assert_allclose(solution.disparity, solutions[0].disparity, atol=1e-3)
+        assert solution.info.iterations > 0
+        assert solution.info.relative_residual <= 2e-9
+
+
+def test_multigrid_needs_far_fewer_iterations_than_jacobi():
+    problem = random_problem(70, 90, seed=8)
+    multigrid, jacobi = (
+        solve_mrf(*problem.inputs, solver=solver, tolerance=1e-8).info.iterations
+        for solver in ("multigrid", "cg")
+    )
+    assert multigrid * 4 < jacobi
+
+
+def test_auto_is_direct_on_small_images_and_multigrid_on_large_ones():
+    assert solve_mrf(*random_problem(20, 20, 1).inputs).info.solver == "direct"
+    assert solve_mrf(*random_problem(70, 70, 1).inputs).info.solver == "multigrid"
+
+
+def test_missing_disparities_count_as_the_nearest_without_confidence():
+    problem = random_problem(9, 11, seed=9)
+    holes = problem.disparity.copy()
+    holes[:, 4] = np.nan
+    patched, confidence = problem.disparity.copy(), problem.confidence.copy()
+    patched[:, 4] = patched[:, 3]
+    confidence[:, 4] = 0
+    found = solve_mrf(holes, problem.confidence, problem.gradient, problem.image).disparity
+    either = []
+    for column in (3, 5):
+        patched[:, 4] = problem.disparity[:, column]
+        either.append(
+            dense_minimiser(Problem(patched, confidence, problem.gradient, problem.image), DEFAULTS)
+        )
+    assert min(np.abs(found - expected).max() for expected in either) < 1e-8
+
+
+def test_a_single_known_pixel_carries_the_whole_image():
+    problem = random_problem(13, 10, seed=10, style="smooth")
+    holes = np.full((13, 10), np.nan)
+    holes[6, 4] = 30.0
+    refined = refine_disparity(holes, np.ones((13, 10)), np.zeros((13, 10, 2)), problem.image)
+    np.testing.assert_allclose(refined, 30.0, atol=1e-4)
+
+
+def test_a_gradient_that_is_not_known_leaves_its_difference_free():
+    image = np.full((6, 8, 3), 100, np.uint8)
+    step = np.where(np.arange(8) < 4, 10.0, 20.0) * np.ones((6, 1))
+    gradient = np.zeros((6, 8, 2))
+    gradient[:, 3, 0] = np.nan
+    found = refine_disparity(step, np.ones((6, 8)), gradient, image)
+    np.testing.assert_allclose(found, step, atol=1e-4)
+    gradient[:, 3, 0] = 0.0
+    assert np.abs(refine_disparity(step, np.ones((6, 8)), gradient, image) - step).max() > 3
+
+
+def test_a_halo_is_pulled_to_the_edge_of_the_image():
+    frame = toy_frame(0)
+    refined = refine_disparity(frame.disparity, frame.confidence, frame.gradient, frame.image)
+    halo = (np.abs(frame.disparity - frame.truth) > 5) & np.isfinite(frame.truth)
+    assert halo.sum() > 100
+    before, after = (np.abs(d - frame.truth)[halo].mean() for d in (frame.disparity, refined))
+    assert after < 0.1 * before
+
+
+def test_a_solver_that_stalls_says_so_and_falls_back(monkeypatch):
+    import refine.solvers.cg
+
+    monkeypatch.setattr(refine.solvers.cg, "MAX_ITERATIONS", 3)
+    problem = random_problem(20, 20, seed=11)
+    with pytest.warns(ConvergenceWarning, match=r"the cg solver stopped .* after 3 iterations"):
+        solution = solve_mrf(*problem.inputs, solver="cg")
+    assert solution.info.fell_back
+    assert solution.info.solver == "direct"
+    np.testing.assert_array_equal(solution.disparity, solve_mrf(*problem.inputs, solver="direct").disparity)
+
+
+def test_a_region_tied_to_nothing_is_an_error_not_a_number():
+    parameters = MRFParameters(alpha=0.0, beta=0.0, confidence_floor=0.0)
+    confidence = np.ones((5, 5))
+    confidence[2, 2] = 0
+    problem = random_problem(5, 5, seed=12)
+    with pytest.raises(SolverError, match="5x5"):
+        refine_disparity(problem.disparity, confidence, problem.gradient, problem.image, parameters)
+
+
+def change(problem: Problem, **arrays: object) -> tuple[object, ...]:
+    values = {**vars(problem), **arrays}
+    return values["disparity"], values["confidence"], values["gradient"], values["image"]
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"disparity": np.zeros(5)}, r"disparity must be \(H, W\)"),
+        ({"disparity": np.zeros((0, 4))}, "at least one pixel"),
+        ({"disparity": np.full((4, 5), np.inf)}, "infinities"),
+        ({"disparity": np.full((4, 5), np.nan)}, "none of the 5x4 pixels"),
+        ({"confidence": np.ones((5, 4))}, r"confidence has shape \(5, 4\)"),
+        ({"confidence": np.full((4, 5), 1.5)}, r"confidence must be in \[0, 1\].*1\.5"),
+        ({"confidence": np.full((4, 5), np.nan)}, "20 NaN"),
+        ({"gradient": np.zeros((4, 5))}, r"expected \(4, 5, 2\)"),
+        ({"gradient": np.full((4, 5, 2), -np.inf)}, "gradient holds infinities"),
+        ({"image": np.zeros((4, 5, 3))}, "must be uint8.*float64"),
+        ({"image": np.zeros((4, 5), np.uint8)}, r"\(4, 5, 3\)"),
+    ],
+)
+def test_bad_arrays_are_named(arrays, message):
+    with pytest.raises(ValueError, match=message):
+        refine_disparity(*change(random_problem(4, 5, seed=0), **arrays))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"form": "best"}, "'best'"), ({"solver": "magic"}, "'magic'"), ({"tolerance": 0.0}, "tolerance")],
+)
+def test_bad_options_are_named(options, message):
+    with pytest.raises(ValueError, match=message):
+        refine_disparity(*random_problem(4, 5, seed=0).inputs, **options)
+
+
+@pytest.mark.parametrize(
+    "values", [{"alpha": -1.0}, {"beta": float("nan")}, {"sigma_r": 0.0}, {"confidence_floor": 2.0}]
+)
+def test_bad_parameters_are_named(values):
+    with pytest.raises(ValueError, match=next(iter(values))):
+        MRFParameters(**values)
+
+
+def test_no_warning_in_the_usual_case():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        refine_disparity(*random_problem(70, 70, seed=13).inputs)
+
+
+def test_neighbours_are_the_eight_around():
+    assert set(NEIGHBORS) == {(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)} - {(0, 0)}
