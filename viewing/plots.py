@@ -5,6 +5,7 @@ No pyplot, hence no global figures: a plot is made, turned into text or pixels, 
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 from collections.abc import Mapping, Sequence
@@ -62,8 +63,11 @@ def svg(figure: Figure) -> str:
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     # In HTML an <svg> needs no namespace; without them the page holds no address that could be fetched.
     text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text).replace("xlink:href", "href")
-    # Names of matplotlib's groups repeat from plot to plot, and nothing refers to them.
+    # Names of matplotlib's groups repeat from plot to plot, and nothing refers to them. Those of markers and
+    # clipping paths may repeat too: the plot's own hash makes them its own.
     text = re.sub(r'<g id="[\w.]+_\d+">', "<g>", text)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:8]
+    text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>p{digest}-", text)
     return text.replace(_INK, "currentColor").strip()
 
 

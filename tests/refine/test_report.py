@@ -1,0 +1,188 @@
+"""The report: whole, self-contained, and the same numbers in all three files."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from refine.evaluation import evaluate
+from refine.lens import boundary_window
+from refine.overview import overview_picture
+from refine.report import ReportContext, write_report
+from tests.refine.worlds import toy_frame
+
+VOID = {"meta", "img", "input", "link", "br", "hr"}
+
+
+class Page(HTMLParser):
+    """Reads a page, insists that tags match, and keeps tables, pictures and references."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.references: list[str] = []
+        self.pictures = 0
+        self.tables: dict[str, list[list[str]]] = {}
+        self.text = ""
+        self._table = ""
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+        if "id" in values:
+            self.ids.append(values["id"])
+        self.references += [values[name] for name in ("src", "href", "action", "data") if values.get(name)]
+        self.pictures += tag == "img"
+        if tag == "table":
+            self._table = values.get("id", "")
+            self.tables[self._table] = []
+        if self._table and tag == "tr":
+            self.tables[self._table].append([])
+        if self._table and tag == "td":
+            self.tables[self._table][-1].append(values.get("data-value", ""))
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+        if tag == "table":
+            self._table = ""
+
+    def handle_data(self, data):
+        self.text += data
+        if self._table and self.open[-1] == "th" and self.tables[self._table][-1:]:
+            self.tables[self._table][-1].append(data)
+
+
+@pytest.fixture(scope="module")
+def evaluation():
+    frames = [toy_frame(seed) for seed in range(6)]
+    error = np.abs(frames[0].disparity - frames[0].truth)
+    frames[0] = replace(frames[0], other_confidences={"lrc": -error})
+    return evaluate(frames)
+
+
+@pytest.fixture(scope="module")
+def written(evaluation, tmp_path_factory):
+    context = ReportContext(
+        title="A <small> report",
+        lead="Six toy frames.",
+        facts={"Weights": "none & nothing", "Data": "toys"},
+        limits=("These are toys.",),
+    )
+    return write_report(evaluation, tmp_path_factory.mktemp("report") / "deep" / "out", context)
+
+
+@pytest.fixture(scope="module")
+def page(written):
+    parser = Page()
+    parser.feed(written.html.read_text())
+    parser.close()
+    return parser
+
+
+def test_the_page_is_well_formed_and_needs_nothing_from_outside(written, page):
+    assert page.open == []
+    assert len(page.ids) == len(set(page.ids))
+    assert page.pictures > 30
+    assert all(reference.startswith(("data:image/", "#")) for reference in page.references)
+    text = re.sub(r"data:image/[a-z]+;base64,[A-Za-z0-9+/=]+", "", written.html.read_text())
+    assert not re.search(r"https?:|url\([^#]|@import|//[a-z]+\.[a-z]", text)
+
+
+def test_what_the_context_says_is_on_the_page_and_escaped(written, page):
+    assert "A <small> report" in page.text
+    assert "A &lt;small&gt; report" in written.html.read_text()
+    for text in ("Six toy frames.", "none & nothing", "These are toys."):
+        assert text in page.text
+
+
+def test_csv_json_and_page_hold_the_same_numbers(evaluation, written, page):
+    rows = list(csv.DictReader(written.csv.read_text().splitlines()))
+    document = json.loads(written.json.read_text())
+    assert len(rows) == 4 + 4 + 6 * (4 + 3) + 1
+    for row in rows:
+        place = document["frames"][row["frame"]] if row["frame"] else document["set"]
+        numbers = place[f"{row['kind']}s"][row["name"]]
+        for measure, value in row.items():
+            if measure not in ("frame", "kind", "name"):
+                expected = numbers.get(measure)
+                assert value == "" if expected is None else float(value) == expected
+    pooled = {row["name"]: row for row in rows if not row["frame"] and row["kind"] == "method"}
+    columns = ("bad_all", "epe_all", "bad_occ", "epe_occ", "gradient_masked", "gradient_all", "seconds")
+    shown = {row[0]: row[1:] for row in page.tables["table-errors"][1:]}
+    for name, label in evaluation.labels.items():
+        assert shown[label] == [pooled[name][column] for column in columns]
+    assert float(pooled["ours"]["bad_all"]) == evaluation.scores["ours"].regions["all"].bad
+    assert document["set"]["methods"]["gradnet"]["bad_all"] is None
+    assert document["about"]["limits"] == ["These are toys."]
+    mean_auc = np.mean([frame.aucs["confnet"] for frame in evaluation.frames])
+    assert document["set"]["confidences"]["confnet"]["auc"] == pytest.approx(mean_auc)
+
+
+def test_ratios_stand_beside_the_papers(evaluation, page):
+    rows = {row[0]: row[1:] for row in page.tables["table-ratios-1"][1:]}
+    start, end = evaluation.scores["regressor"], evaluation.scores["ours"]
+    assert float(rows["here"][1]) == pytest.approx(end.regions["all"].epe / start.regions["all"].epe)
+    assert float(rows["paper, FlyingThings3D test"][0]) == pytest.approx(21.17 / 23.48)
+    assert float(rows["paper, Sintel"][4]) == pytest.approx(0.32 / 0.45)
+
+
+def test_frames_are_listed_and_failures_shown(evaluation, page):
+    assert len(page.tables["table-frames"]) == 1 + 6
+    for panel in (*evaluation.first, *evaluation.worst):
+        assert panel.frame.name in page.text
+
+
+def test_writing_again_replaces_and_leaves_no_litter(evaluation, written):
+    before = written.json.read_text()
+    write_report(evaluation, written.html.parent, ReportContext(title="Second"))
+    assert {path.name for path in written.html.parent.iterdir()} == {
+        "report.html",
+        "results.csv",
+        "results.json",
+    }
+    assert json.loads(written.json.read_text())["about"]["title"] == "Second"
+    assert before != written.json.read_text()
+
+
+def test_a_report_of_one_frame_without_networks(tmp_path):
+    frame = replace(toy_frame(0), confidence=None, gradient=None, truth=np.full((48, 80), 8.0, np.float32))
+    files = write_report(evaluate([frame]), tmp_path)
+    parser = Page()
+    parser.feed(files.html.read_text())
+    assert parser.open == []
+    assert "Not run: Ours needs confidence and gradient, which the frames lack." in parser.text
+
+
+def test_the_lens_looks_at_the_worst_boundary():
+    frame = toy_frame(3)
+    rows, columns = boundary_window(frame.disparity, frame.truth, (16, 20))
+    assert (rows.stop - rows.start, columns.stop - columns.start) == (16, 20)
+    halo = np.abs(frame.disparity - frame.truth) > 5
+    assert halo[rows, columns].sum() > 40
+    assert boundary_window(frame.disparity, np.full_like(frame.truth, 5), (16, 20)) is None
+    whole = boundary_window(frame.disparity, frame.truth, (500, 500))
+    assert frame.truth[whole].shape == frame.truth.shape
+
+
+def test_the_overview_shows_four_pictures_of_the_pairs_shape():
+    frame = toy_frame(0)
+    picture = overview_picture(frame.image, frame.disparity, frame.confidence, frame.truth)
+    assert picture.dtype == np.uint8
+    assert picture.shape[2] == 3
+    assert 1.3 < picture.shape[1] / picture.shape[0] < 2.2
+    halves = np.array_split(picture[:, : picture.shape[1] // 2 * 2], 2, axis=1)
+    cells = [cell for half in halves for cell in np.array_split(half[: half.shape[0] // 2 * 2], 2, axis=0)]
+    assert all((cell != 255).mean() > 0.4 for cell in cells)
