@@ -32,7 +32,7 @@ def sample_sun(rng: np.random.Generator, view: NDArray[np.float64]) -> SunLight:
     return SunLight(
         direction=vector(across - (0.0, 0.0, math.sin(elevation))),
         color=sample_light_color(rng, 0.4),
-        irradiance=log_uniform(rng, 1.0, 5.0),
+        irradiance=log_uniform(rng, 1.5, 8.0),
         angle_deg=log_uniform(rng, 0.5, 12.0),
     )
 

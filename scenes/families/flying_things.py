@@ -38,10 +38,10 @@ from scenes.textures.sky import Sky
 Count = tuple[int, int]
 """Smallest and largest number, both included."""
 
-_SHAPE_FILL = 1.4
-"""Mean projected area of the shapes, in squares of their half extent; measured over all generators."""
+_SHAPE_FILL = 1.8
+"""Mean projected area of the shapes, in squares of their half extent; measured over 300 draws."""
 _REACH = 1.35
-"""Distance from a shape's centre to its farthest point that only elongated diagonal shapes exceed."""
+"""Distance from a shape's centre to its farthest point, in half extents, which one in ten exceeds."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class FlyingThingsConfig(FamilyConfig):
     """Disparity of the farthest and the nearest surface, as a share of the image width: 2 to 160 px at 960."""
     background_disparity_share: Range = (0.005, 0.04)
     """Where the background objects stand, as a share of the image width."""
-    flying_cover: Range = (0.4, 0.65)
+    flying_cover: Range = (0.32, 0.58)
     """Share of the image the flying objects would cover if they were placed independently."""
     flying_speed: Range = (0.0, 0.03)
     """Speed of a flying object, as a share of its depth per frame (0.03 is about 30 px per frame at 960)."""
@@ -72,13 +72,13 @@ class FlyingThingsConfig(FamilyConfig):
     """Speed of the camera, as a share of the nearest depth per frame."""
     camera_turn_deg: Range = (0.0, 0.6)
     """How fast the camera turns, degrees per frame."""
-    pitch_deg: Range = (-3.0, 8.0)
+    pitch_deg: Range = (-2.0, 12.0)
     """How far the camera looks down."""
     roll_deg: Range = (-4.0, 4.0)
     """How far the camera leans."""
     suns: Count = (1, 2)
     area_lights: Count = (0, 4)
-    sky_strength: Range = (0.4, 1.1)
+    sky_strength: Range = (0.5, 1.4)
     """Brightness of the sky's light."""
 
     def __post_init__(self) -> None:
@@ -128,13 +128,30 @@ class _Rig:
         return world
 
 
+@dataclass(frozen=True)
+class _Land:
+    """The ground and where it lies in the world."""
+
+    terrain: Terrain
+    half_m: float
+    """Half its side."""
+    level_m: float
+    """World z of the ground below the world's origin."""
+
+    def height_m(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """World z of the ground at (N, 2) world points."""
+        height: NDArray[np.float64] = self.level_m + self.half_m * self.terrain.height(points_m / self.half_m)
+        return height
+
+
 def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -> Scene:
     """Draw one scene."""
     rig = _sample_rig(rng, config)
+    land = _sample_land(rng, rig)
     materials: list[Material] = []
-    ground, terrain = _ground(rng, rig, materials)
-    background = _background(rng, rig, terrain, ground.motion, materials)
-    flyers = _flyers(rng, rig, terrain, ground.motion, materials)
+    ground = _ground(rng, rig, land, materials)
+    background = _background(rng, rig, land, materials)
+    flyers = _flyers(rng, rig, land, materials)
     return Scene(
         family="flying_things",
         frames=config.frames,
@@ -143,7 +160,7 @@ def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -
         materials=tuple(materials),
         lights=_lights(rng, rig),
         world=World(Sky.sample(rng, 1024), uniform(rng, *config.sky_strength)),
-        exposure_key=uniform(rng, 0.15, 0.26),
+        exposure_key=uniform(rng, 0.18, 0.32),
         notes={"flying_objects": len(flyers), "background_objects": len(background)},
     )
 
@@ -169,7 +186,7 @@ def _sample_rig(rng: np.random.Generator, config: FlyingThingsConfig) -> _Rig:
     return _Rig(camera, config, camera.pose("left", (config.frames - 1) / 2))
 
 
-def _ground(rng: np.random.Generator, rig: _Rig, materials: list[Material]) -> tuple[SceneObject, Terrain]:
+def _sample_land(rng: np.random.Generator, rig: _Rig) -> _Land:
     """Gently rolling land, below everything the lower edge of the image may show nearer than allowed."""
     half_m = rig.farthest_m
     terrain = Terrain(
@@ -188,10 +205,16 @@ def _ground(rng: np.random.Generator, rig: _Rig, materials: list[Material]) -> t
     around = np.concatenate([circle * share for share in (0.3, 0.6, 1.0, 1.5)]) * rig.nearest_m / half_m
     hump_m = float(terrain.height(around).max()) * half_m
     below_m = rig.nearest_m * (max(drop, 0.1) * uniform(rng, 1.3, 3.5) + 0.3) + hump_m
-    near_px = rig.camera.focal_px / (3 * rig.nearest_m)
-    materials.append(sample_material(rng, half_m * near_px, 512))
-    motion = Trajectory.static((0.0, 0.0, -below_m - terrain.middle_height() * half_m))
-    return SceneObject("ground", terrain, len(materials) - 1, motion, (half_m, half_m, half_m)), terrain
+    return _Land(terrain, half_m, -below_m)
+
+
+def _ground(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]) -> SceneObject:
+    # Its texture is sharp where the ground is at a few times the nearest depth.
+    unit_px = land.half_m * rig.camera.focal_px / (3 * rig.nearest_m)
+    materials.append(sample_material(rng, unit_px, 512))
+    motion = Trajectory.static((0.0, 0.0, land.level_m - land.terrain.middle_height() * land.half_m))
+    scale = (land.half_m, land.half_m, land.half_m)
+    return SceneObject("ground", land.terrain, len(materials) - 1, motion, scale)
 
 
 _STANDING: dict[str, float] = {"Box": 0.3, "DeformedCylinder": 0.2, "Cylinder": 0.08}
@@ -210,50 +233,45 @@ def _sample_shape(rng: np.random.Generator, plain: dict[str, float] | None = Non
 
 
 def _background(
-    rng: np.random.Generator, rig: _Rig, terrain: Terrain, ground: Trajectory, materials: list[Material]
+    rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]
 ) -> list[SceneObject]:
     """Objects standing or lying on the ground in view, near ones small, far ones up to skyline size."""
-    half_m = rig.farthest_m
     first = len(materials)
-    typical_px = 0.08 * rig.camera.width
     kinds = integer(rng, *rig.config.background_materials)
-    materials.extend(sample_material(rng, typical_px) for _ in range(kinds))
+    materials.extend(sample_material(rng, 0.08 * rig.camera.width) for _ in range(kinds))
+    count = integer(rng, *rig.config.background_objects)
+    depths_m = [rig.depth(uniform(rng, *rig.config.background_disparity_share)) for _ in range(count)]
+    spots = np.array([rig.point(uniform(rng, -1.25, 1.25), 0.0, depth_m) for depth_m in depths_m])
+    spots = spots.reshape(-1, 3)
+    spots[:, 2] = land.height_m(spots[:, :2])
     things = []
-    for index in range(integer(rng, *rig.config.background_objects)):
-        depth_m = rig.depth(uniform(rng, *rig.config.background_disparity_share))
-        spot = rig.point(uniform(rng, -1.25, 1.25), 0.0, depth_m)
+    for index, (depth_m, spot) in enumerate(zip(depths_m, spots, strict=True)):
         size_m = depth_m * rig.half_view[0] * log_uniform(rng, 0.05, 0.3)
-        hill_m = float(terrain.height(spot[None, :2] / half_m)[0]) * half_m
-        land_m = ground.positions_m[0][2] + terrain.middle_height() * half_m + hill_m
-        spot[2] = land_m + size_m * uniform(rng, 0.2, 0.7)
+        sunk = np.array((0.0, 0.0, size_m * uniform(rng, 0.2, 0.7)))
         upright = Rotation.from_euler("Z", uniform(rng, 0.0, 360.0), degrees=True)
         turn = upright if chance(rng, 0.6) else Rotation.random(random_state=rng)
-        stretch = rng.uniform(0.75, 1.25, 3)
         things.append(
             SceneObject(
                 name=f"background {index}",
                 shape=_sample_shape(rng, _STANDING),
                 material=integer(rng, first, len(materials) - 1),
-                motion=Trajectory.static(vector(spot), quaternion(turn)),
-                scale_m=vector(size_m * stretch),
+                motion=Trajectory.static(vector(spot + sunk), quaternion(turn)),
+                scale_m=vector(size_m * rng.uniform(0.75, 1.25, 3)),
             )
         )
     return things
 
 
-def _flyers(
-    rng: np.random.Generator, rig: _Rig, terrain: Terrain, ground: Trajectory, materials: list[Material]
-) -> list[SceneObject]:
+def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]) -> list[SceneObject]:
     count = integer(rng, *rig.config.flying_objects)
-    # `count` objects of this cover each leave 1 - cover of the image free, if placed independently.
+    # `count` objects of this cover each leave 1 - flying_cover of the image free, if placed independently.
     each = 1 - (1 - uniform(rng, *rig.config.flying_cover)) ** (1 / max(count, 1))
-    floor_m = ground.positions_m[0][2] + terrain.middle_height() * rig.farthest_m
     flyers = []
     for index in range(count):
-        cover = min(each * math.exp(rng.normal(-0.1, 0.5)), 0.14)
+        cover = min(each * math.exp(rng.normal(-0.1, 0.5)), 0.12)
         size_px = math.sqrt(cover * rig.camera.width * rig.camera.height / _SHAPE_FILL)
         materials.append(sample_material(rng, size_px))
-        flyers.append(_flyer(rng, rig, f"flying {index}", len(materials) - 1, size_px, floor_m))
+        flyers.append(_flyer(rng, rig, f"flying {index}", len(materials) - 1, size_px, land.level_m))
     return flyers
 
 

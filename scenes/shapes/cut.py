@@ -57,7 +57,7 @@ class CarvedSolid(Shape):
             base=choose(rng, _KINDS),
             proportions=sample_proportions(rng, 0.4),
             cuts=cuts,
-            cut_size=log_uniform(rng, 0.3, 0.75) / cuts**0.3,
+            cut_size=log_uniform(rng, 0.45, 0.9) / cuts**0.25,
             seed=new_seed(rng),
         )
 

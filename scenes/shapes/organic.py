@@ -63,7 +63,7 @@ class Blob(Shape):
         frequency = log_uniform(rng, 1.0, 4.0)
         return cls(
             radii=sample_proportions(rng, 0.5),
-            amplitude=uniform(rng, 0.1, 0.35) / np.sqrt(frequency),
+            amplitude=float(uniform(rng, 0.15, 0.5) / np.sqrt(frequency)),
             frequency=frequency,
             slope=uniform(rng, 0.5, 2.0),
             seed=new_seed(rng),
