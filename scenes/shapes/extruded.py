@@ -138,8 +138,9 @@ class HoledPlate(Shape):
         angle = np.pi / 4 if self.hole_corners == 4 else np.pi / 2
         reach = self.open_share / 2 * (np.sqrt(2.0) if self.hole_corners == 4 else 1.0)
         hole = regular_polygon(self.hole_corners, float(reach), float(angle))
-        cell = np.asarray(triangulate([square, hole[::-1]]), np.int64)
-        corners = np.concatenate([square, hole])
+        contours = [square, hole[::-1]]
+        cell = np.asarray(triangulate(contours), np.int64)
+        corners = np.concatenate(contours)
         column, row = np.meshgrid(np.arange(self.columns), np.arange(self.rows))
         centres = np.stack([column.ravel(), row.ravel()], -1).astype(np.float64)
         plan = (centres[:, None] + corners).reshape(-1, 2)
