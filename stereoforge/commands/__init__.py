@@ -3,9 +3,13 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from stereoforge.commands.demo import Demo
+from stereoforge.commands.evaluate import Evaluate
+from stereoforge.commands.refine import Refine
 from stereoforge.commands.render import Render
 from stereoforge.commands.train import Train
 from stereoforge.commands.verify import Verify
+from stereoforge.commands.view import View
 
 
 class Command(Protocol):
@@ -18,6 +22,10 @@ class Command(Protocol):
 COMMANDS: dict[str, Callable[..., Command]] = {
     "render": Render,
     "verify": Verify,
+    "view": View,
     "train": Train,
+    "refine": Refine,
+    "evaluate": Evaluate,
+    "demo": Demo,
 }
 """Every command by its name, in the order of use."""

@@ -45,7 +45,11 @@ class Train:
     """auto, cpu, cuda, cuda:1, ..."""
 
     def run(self) -> None:
-        for name, value, least in (("steps", self.steps, 1), ("seed", self.seed, 0), ("workers", self.workers, 0)):
+        for name, value, least in (
+            ("steps", self.steps, 1),
+            ("seed", self.seed, 0),
+            ("workers", self.workers, 0),
+        ):
             if value is not None and value < least:
                 raise UsageError(f"--{name} must be at least {least}, got {value}")
         data = [parse_weighted_folder(text) for text in self.data]
@@ -66,5 +70,9 @@ class Train:
         figures = ", ".join(f"{name} {value:.4g}" for name, value in summary.validation.items())
         console.print(
             f"{self.out / self.task}.safetensors: step {summary.best_step} of {summary.steps}"
-            + (f"; validation {figures}" if figures else "; no validation split, so the last weights are kept")
+            + (
+                f"; validation {figures}"
+                if figures
+                else "; no validation split, so the last weights are kept"
+            )
         )

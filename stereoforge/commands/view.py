@@ -1,0 +1,40 @@
+"""`stereoforge view`: a data set to look at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from stereoforge.errors import UsageError
+from stereoforge.progress import console, progress_bar
+from stereoforge.values import shown
+
+
+@dataclass(frozen=True)
+class View:
+    """Write a gallery of a data set, with statistics: one HTML file that opens from disk."""
+
+    data: Annotated[tyro.conf.Positional[Path], shown("DIR")]
+    """Folder of the data set."""
+    out: Annotated[Path, shown("FILE.html")]
+    """The file to write."""
+    scenes: Annotated[int, shown("N")] = 24
+    """How many scenes to show, evenly spread."""
+
+    def run(self) -> None:
+        if self.scenes < 1:
+            raise UsageError(f"--scenes must be at least 1, got {self.scenes}")
+        from datagen.gallery import write_gallery
+
+        with progress_bar() as progress:
+            task = progress.add_task("reading", total=None)
+            write_gallery(
+                self.data,
+                self.out,
+                scenes=self.scenes,
+                progress=lambda done, total: progress.update(task, completed=done, total=total),
+            )
+        console.print(f"{self.out}: {self.out.stat().st_size / 1e6:.1f} MB")

@@ -1,0 +1,76 @@
+"""Joining data sets, networks and the MRF into an evaluation and its report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from datagen import StereoDataset, StereoSample
+from refine.evaluation import Evaluation, EvaluationFrame, evaluate
+from refine.methods import default_methods
+from refine.report import ReportContext, ReportFiles, write_report
+from stereoforge.progress import progress_bar
+from training.predict import StereoPredictor
+
+
+def evaluate_datasets(
+    datasets: Sequence[StereoDataset], predictor: StereoPredictor, methods: tuple[str, ...] = ()
+) -> Evaluation:
+    """Run the networks and every method on every frame, showing progress."""
+    samples = [sample for dataset in datasets for sample in dataset]
+    chosen = default_methods(methods)
+    with progress_bar() as progress:
+        task = progress.add_task("evaluating", total=len(samples))
+        return evaluate(
+            (predict_frame(sample, predictor) for sample in samples),
+            chosen,
+            progress=lambda done, _: progress.update(task, completed=done),
+        )
+
+
+def predict_frame(sample: StereoSample, predictor: StereoPredictor) -> EvaluationFrame:
+    """One sample with what the networks say about it."""
+    prediction = predictor.predict(sample.left, sample.right)
+    return EvaluationFrame(
+        name=sample.name,
+        image=sample.left,
+        truth=sample.disparity_left,
+        occlusion=sample.occlusion_left,
+        disparity=prediction.disparity,
+        confidence=prediction.confidence,
+        gradient=prediction.gradient,
+    )
+
+
+def report_evaluation(
+    evaluation: Evaluation,
+    datasets: Sequence[StereoDataset],
+    weights: Path,
+    out: Path,
+    limits: tuple[str, ...] = (),
+    title: str = "StereoForge evaluation",
+) -> ReportFiles:
+    """Write the report, saying what was evaluated with what."""
+    return write_report(
+        evaluation,
+        out,
+        ReportContext(
+            title=title,
+            facts={
+                "Data": ", ".join(f"{dataset.layout.root} ({dataset.split})" for dataset in datasets),
+                "Frames": str(len(evaluation.frames)),
+                "Weights": "; ".join(_describe_networks(weights)),
+            },
+            limits=limits,
+        ),
+    )
+
+
+def _describe_networks(weights: Path) -> Iterator[str]:
+    from training.presets import TASKS
+    from training.weights import has_weights, read_summary
+
+    for task in TASKS:
+        if has_weights(weights, task):
+            summary = read_summary(weights, task)
+            yield f"{task} ({summary.preset}, step {summary.best_step} of {summary.steps})"
