@@ -1,8 +1,9 @@
 """What the arrays of one frame must satisfy among themselves. Each check yields one sentence a problem.
 
-The limits on shares of pixels leave room for silhouettes, where neighbouring pixels of the other view see
-different surfaces, and for things thinner than a pixel; an error of convention (sign, half a pixel, swapped
-views) moves nearly all pixels and is far above them.
+The limits on shares of pixels leave room for silhouettes, where the rounding of rays decides, and for things
+thinner than a pixel, which the neighbouring pixels of the other view miss. Measured on flying_things from
+96 x 54 to 480 x 270, the largest shares are a tenth to a third of the limits; an error of convention (sign,
+half a pixel, swapped views) moves nearly all pixels.
 """
 
 from __future__ import annotations
@@ -27,13 +28,15 @@ CONSISTENCY_TOLERANCE_PX = 0.25
 """How far a visible pixel's disparity may lie outside those of the two pixels it falls between."""
 NEARER_PX = 1e-2
 """What hides a point has a disparity greater than the point's by more than this."""
-MAX_INCONSISTENT = 0.01
-"""Share of pixels whose two views may disagree."""
+MAX_INCONSISTENT = 0.1
+"""Share of pixels whose two views may disagree, by what the neighbouring pixels there show."""
 FRAME_TIE_PX = 1e-3
 """A point this close to the other frame's edge may be labelled either way."""
 GEOMETRY_TOLERANCE_PX = 1e-2
 MAX_OFF_GEOMETRY = 0.01
 """Share of sampled pixels that may differ from the scene's geometry by more than the tolerance."""
+MAX_OFF_LABELS = 0.03
+"""Share of sampled pixels whose occlusion may differ: boundaries of occlusion are longer than silhouettes."""
 MIN_COUNTED = 50
 """Shares of fewer pixels than this say nothing."""
 
@@ -128,7 +131,10 @@ def check_images(
 
 
 def check_geometry(
-    disparity: NDArray[np.float32], object_index: NDArray[np.uint16], expected: Hits
+    disparity: NDArray[np.float32],
+    object_index: NDArray[np.uint16],
+    occlusion: NDArray[np.uint8],
+    expected: Hits,
 ) -> Iterator[str]:
     """Sampled pixels (N,) agree with the rays cast at the scene's meshes."""
     error = np.abs(disparity - expected.disparity)
@@ -141,6 +147,11 @@ def check_geometry(
         object_index != expected.object_index,
         MAX_OFF_GEOMETRY,
         "sampled object indices are not those of the scene's geometry",
+    )
+    yield from _too_many(
+        occlusion != expected.occlusion,
+        MAX_OFF_LABELS,
+        "sampled occlusion labels are not those of the scene's geometry",
     )
 
 

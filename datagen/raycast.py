@@ -9,9 +9,11 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from datagen.ground_truth import RectifiedPair
+from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE, RectifiedPair
 from datagen.layout import Eye
 from scenes import Scene
+
+_FAR = 1e30
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,8 @@ class Hits:
     """(N,) pixels; 0 where nothing is hit."""
     object_index: NDArray[np.int64]
     """(N,) 0 where nothing is hit, else 1 + index in `Scene.objects`."""
+    occlusion: NDArray[np.uint8]
+    """(N,) 0 visible, 1 occluded, 2 out of the other frame."""
 
 
 class SceneRayCaster:
@@ -50,24 +54,62 @@ class SceneRayCaster:
         camera = self._scene.camera
         pair = RectifiedPair(camera.width, camera.height, camera.focal_px, camera.baseline_m)
         directions = pair.rays()[rows, columns]
-        origin = np.array([0.0 if eye == "left" else camera.baseline_m, 0.0, 0.0])
         disparity, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
-        if not len(self._triangles):
-            return Hits(disparity, index)
-        if time_frames != self._instant:
-            self._place(time_frames)
-        origins = np.broadcast_to(origin, directions.shape).astype(np.float32)
-        hit = np.asarray(
-            self._embree.run(origins, directions.astype(np.float32), query="INTERSECT"), np.int64
-        )
+        hidden = np.zeros(len(directions), bool)
+        if len(self._triangles):
+            if time_frames != self._instant:
+                self._place(time_frames)
+            eyes = np.array([0.0, 0.0, 0.0]), np.array([camera.baseline_m, 0.0, 0.0])
+            own, other = eyes if eye == "left" else eyes[::-1]
+            disparity, index = self._first_hits(own, directions)
+            hidden = self._hidden(own, other, directions, disparity)
+        x_other = columns + 0.5 + (-disparity if eye == "left" else disparity)
+        outside = (x_other < 0) | (x_other > camera.width)
+        labels = np.where(outside, OUT_OF_FRAME, np.where(hidden, OCCLUDED, VISIBLE))
+        return Hits(disparity, index, labels.astype(np.uint8))
+
+    def _first_hits(
+        self, origin: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        hit = self._run(origin, directions, "INTERSECT", np.full(len(directions), _FAR))
         met = hit >= 0
         corners = self._vertices[self._triangles[hit[met]]] - origin
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # depth = n.v / n.r with a ray r of unit length along the axis, and disparity = fB / depth.
         along = np.einsum("ij,ij->i", normals, directions[met])
-        disparity[met] = camera.disparity_metres * along / np.einsum("ij,ij->i", normals, corners[:, 0])
+        disparity, index = np.zeros(len(hit)), np.zeros(len(hit), np.int64)
+        distance = np.einsum("ij,ij->i", normals, corners[:, 0])
+        disparity[met] = self._scene.camera.disparity_metres * along / distance
         index[met] = 1 + self._owners[hit[met]]
-        return Hits(disparity, index)
+        return disparity, index
+
+    def _hidden(
+        self,
+        own: NDArray[np.float64],
+        other: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        disparity: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Whether something stands between the other eye and what is seen; the sky is in the same direction
+        from both eyes."""
+        sky = disparity == 0
+        depth = self._scene.camera.disparity_metres / np.where(sky, 1.0, disparity)
+        towards = np.where(sky[:, None], directions, own + depth[:, None] * directions - other)
+        return self._run(other, towards, "OCCLUDED", np.where(sky, _FAR, 1 - SAME_SURFACE)) == 0
+
+    def _run(
+        self,
+        origin: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        query: str,
+        reach: NDArray[np.float64],
+    ) -> NDArray[np.int64]:
+        """What Embree answers for rays from one point; `reach` is in lengths of their directions."""
+        origins = np.broadcast_to(origin, directions.shape).astype(np.float32)
+        answer = self._embree.run(
+            origins, directions.astype(np.float32), dists=reach.astype(np.float32), query=query
+        )
+        return np.asarray(answer, np.int64)
 
     def _place(self, time_frames: float) -> None:
         """Put all triangles where they are at an instant."""

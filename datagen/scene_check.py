@@ -175,6 +175,7 @@ class SceneCheck:
         yield from check_geometry(
             view.disparity[rows, columns],
             view.object_index[rows, columns],
+            view.occlusion[rows, columns],
             caster.cast(eye, instant, rows, columns),
         )
 

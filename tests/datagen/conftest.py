@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from datagen import Recipe, render_dataset
+from scenes import FAMILIES
 from tests.datagen.analytic_world import write_dataset
 
 
@@ -22,3 +24,13 @@ def analytic_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def own_dataset(analytic_dataset: Path, tmp_path: Path) -> Path:
     """A copy of the analytic data set to damage."""
     return Path(shutil.copytree(analytic_dataset, tmp_path / "set"))
+
+
+@pytest.fixture(scope="session")
+def rendered_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One train and one test scene of flying_things, rendered by Blender; not to be changed."""
+    root = tmp_path_factory.mktemp("rendered") / "set"
+    world = FAMILIES["flying_things"].config(width=160, height=90)
+    summary = render_dataset(Recipe(world, {"train": 1, "test": 1}, seed=1, samples=1), root, workers=1)
+    assert summary.failures == ()
+    return root

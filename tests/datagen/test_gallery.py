@@ -107,3 +107,13 @@ def test_what_cannot_be_shown_is_said(own_dataset: Path, tmp_path: Path) -> None
     with pytest.raises(DatasetError, match="has no finished scene to show"):
         write_gallery(own_dataset, out)
     assert not out.exists()
+
+
+@pytest.mark.slow
+def test_of_a_rendered_data_set(rendered_dataset: Path, tmp_path: Path) -> None:
+    write_gallery(rendered_dataset, tmp_path / "g.html")
+    text = (tmp_path / "g.html").read_text(encoding="utf-8")
+    assert len(text) < 2 * 400_000
+    lefts, sample = pictures(text, "Left eye"), StereoDataset(rendered_dataset, "train")[0]
+    assert np.abs(lefts[0].astype(int) - sample.left).mean() < 12
+    assert lefts[0].std() > 10

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,8 +28,8 @@ from datagen.ground_truth import forward_differences, gradient_validity
 from datagen.layout import Layout
 from datagen.manifest import file_entry, read_manifest
 from datagen.recipe import read_recipe
-from datagen.verify import VerifyReport, verify_dataset
-from tests.datagen.analytic_world import commit
+from datagen.verify import FEW_SCENES, VerifyReport, verify_dataset
+from tests.datagen.analytic_world import commit, write_dataset
 
 
 def test_a_right_data_set_has_no_problem(analytic_dataset: Path) -> None:
@@ -236,7 +237,8 @@ def test_occlusion_against_disparity(own_dataset: Path) -> None:
     path = Layout(own_dataset).file("occlusion", "train", 0, "left", 6)
     labels = read_occlusion(path)
     for changed, says in (
-        (np.where(labels == 1, 0, labels), "visible pixels have another disparity than the other view"),
+        (np.where(labels == 1, 0, labels), "sampled occlusion labels are not those of the scene"),
+        (np.where(labels == 1, 0, 1), "visible pixels have another disparity than the other view"),
         (np.where(labels == 2, 1, labels), "are labelled against where their disparity puts them"),
         (np.where(labels == 0, 1, labels), "occluded pixels have nothing nearer before them"),
         (labels[:, ::-1].copy(), "are labelled against where their disparity puts them"),
@@ -294,3 +296,37 @@ def test_the_scene_record_of_another_scene(own_dataset: Path) -> None:
     commit_again(own_dataset)
     assert "geometry" in messages(verify_dataset(own_dataset))
     assert len(StereoDataset(own_dataset, "train")) == 4
+
+
+@pytest.mark.slow
+def test_a_rendered_data_set_has_no_problem_and_swapped_views_have(
+    rendered_dataset: Path, tmp_path: Path
+) -> None:
+    assert [str(problem) for problem in verify_dataset(rendered_dataset, workers=2).problems] == []
+    root = Path(shutil.copytree(rendered_dataset, tmp_path / "set"))
+    change_disparities(root, lambda arrays: {"left": arrays["right"], "right": arrays["left"]})
+    found = messages(verify_dataset(root))
+    assert "sampled disparities are over 0.01 px from the scene's geometry" in found
+    assert "visible pixels have another disparity than the other view has there" in found
+
+
+@pytest.mark.slow
+def test_processes_of_their_own_find_the_same(tmp_path: Path) -> None:
+    write_dataset(tmp_path / "set", {"train": FEW_SCENES})
+    damaged = Layout(tmp_path / "set").file("occlusion", "train", 3, "left", 7)
+    damaged.write_bytes(damaged.read_bytes()[:-1])
+    calls: list[tuple[int, int]] = []
+    report = verify_dataset(tmp_path / "set", lambda *done: calls.append(done), workers=2)
+    alone = verify_dataset(tmp_path / "set", workers=1)
+    assert report.problems == alone.problems
+    assert len(report.problems) == 1
+    assert (report.frames, report.files, report.bytes_read) == (alone.frames, alone.files, alone.bytes_read)
+    assert calls == [(done, FEW_SCENES) for done in range(1, FEW_SCENES + 1)]
+
+
+def test_without_rays_the_geometry_is_left_out_and_nothing_else(own_dataset: Path) -> None:
+    change_disparities(own_dataset, lambda arrays: {eye: array * 0 for eye, array in arrays.items()})
+    assert "from the scene's geometry" in messages(verify_dataset(own_dataset))
+    without = messages(verify_dataset(own_dataset, sampled_pixels=0))
+    assert "geometry" not in without
+    assert "pixels are sky in one of object index and disparity" in without
