@@ -15,6 +15,7 @@ from cattrs import Converter, transform_error
 from cattrs.errors import ClassValidationError
 from cattrs.gen import make_dict_structure_fn
 from cattrs.strategies import configure_tagged_union
+from cattrs.v import format_exception
 
 import scenes.shapes
 import scenes.textures
@@ -73,9 +74,15 @@ def from_plain(data: Any, kind: type[T]) -> T:
     try:
         return _converter.structure(data, kind)
     except ClassValidationError as error:
-        raise ValueError("; ".join(transform_error(error, path=kind.__name__))) from error
+        sentences = transform_error(error, path=kind.__name__, format_exception=_describe)
+        raise ValueError("; ".join(sentences)) from error
     except (TypeError, KeyError, AttributeError) as error:
         raise ValueError(f"{kind.__name__}: {error}") from error
+
+
+def _describe(error: BaseException, kind: type | None) -> str:
+    """What is wrong with one field: our records' own words where they have some, else cattrs'."""
+    return str(error) if type(error) is ValueError else format_exception(error, kind)
 
 
 def scene_to_json(scene: Scene) -> str:

@@ -161,7 +161,7 @@ def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -
         lights=_lights(rng, rig),
         world=World(Sky.sample(rng, 1024), uniform(rng, *config.sky_strength)),
         exposure_key=uniform(rng, 0.18, 0.32),
-        notes={"flying_objects": len(flyers), "background_objects": len(background)},
+        notes={"flying_objects": float(len(flyers)), "background_objects": float(len(background))},
     )
 
 
@@ -199,7 +199,7 @@ def _sample_land(rng: np.random.Generator, rig: _Rig) -> _Land:
         seed=new_seed(rng),
     )
     # A ray through the image's lower edge drops by this much for every metre of depth.
-    drop = -(rig.point(0.0, -1.0, 1.0) - rig.pose[:3, 3])[2]
+    drop = -float(rig.pose[2, :3] @ (0.0, -rig.half_view[1], -1.0))
     angle = np.linspace(0.0, 2 * np.pi, 24)
     circle = np.stack([np.cos(angle), np.sin(angle)], -1)
     around = np.concatenate([circle * share for share in (0.3, 0.6, 1.0, 1.5)]) * rig.nearest_m / half_m

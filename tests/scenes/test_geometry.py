@@ -81,7 +81,9 @@ def test_solid_turns_inside_out_surfaces() -> None:
 
 
 def test_fit_to_cube_keeps_proportions() -> None:
-    points = Rotation.random(random_state=1).apply(np.random.default_rng(0).normal(size=(50, 3))) * (1, 4, 2) + 7
+    points = (
+        Rotation.random(random_state=1).apply(np.random.default_rng(0).normal(size=(50, 3))) * (1, 4, 2) + 7
+    )
     fitted, factor = fit_to_cube(points)
     np.testing.assert_allclose(np.ptp(fitted, axis=0), np.ptp(points, axis=0) * factor)
     assert np.ptp(fitted, axis=0).max() == pytest.approx(2.0)

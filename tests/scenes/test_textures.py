@@ -105,7 +105,11 @@ def test_palettes_span_dark_and_light_and_are_neither_all_grey_nor_all_neon() ->
 
 def test_oklch_reproduces_known_colours() -> None:
     # White, black, and sRGB red from Ottosson's table: L .6279, C .2577, h 29.23 degrees.
-    lightness, chroma, hue = np.array([1.0, 0.0, 0.6279]), np.array([0.0, 0.0, 0.2577]), np.radians([0, 0, 29.23])
+    lightness, chroma, hue = (
+        np.array([1.0, 0.0, 0.6279]),
+        np.array([0.0, 0.0, 0.2577]),
+        np.radians([0, 0, 29.23]),
+    )
     colors = oklch_to_srgb(lightness, chroma, hue)
     np.testing.assert_allclose(colors, [(255, 255, 255), (0, 0, 0), (255, 0, 0)], atol=2)
 
