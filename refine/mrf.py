@@ -85,7 +85,8 @@ def refine_disparity(
 
     Raises:
         ValueError: If a shape, type or range is wrong, or no pixel has a disparity.
-        refine.SolverError: If the system is singular: with a `confidence_floor` of 0, a region without confidence
+        refine.SolverError: If the system is singular: with a `confidence_floor` of 0, a region without
+        confidence
             that nothing ties to its surroundings.
     """
     return solve_mrf(
