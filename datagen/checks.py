@@ -162,7 +162,7 @@ def _in_other_view(
     of the two pixels whose centres it lies between."""
     width = disparity.shape[1]
     sign = -1.0 if eye == "left" else 1.0
-    x = np.arange(width) + 0.5 + sign * np.nan_to_num(disparity.astype(np.float64))
+    x = np.arange(width) + 0.5 + sign * disparity.astype(np.float64)
     first = np.floor(np.clip(x - 0.5, -1, width)).astype(np.int64)
     rows = np.arange(len(disparity))[:, None]
     one = other_disparity[rows, np.clip(first, 0, width - 1)]

@@ -49,9 +49,9 @@ class StereoSample:
     @property
     def name(self) -> str:
         """Split, scene and frame, for example `TEST/A/0003/0006`."""
-        left = self._file("disparity", "left")
-        scene = self.layout.scene_folder("disparity", self.split, self.scene)
-        return f"{self.layout.relative(scene).partition('/')[2]}/{left.stem}"
+        left = self._file(self._image_kind, "left")
+        split, group, scene, _, _ = left.parts[-5:]
+        return "/".join((split, group, scene, left.stem))
 
     @cached_property
     def size(self) -> tuple[int, int]:

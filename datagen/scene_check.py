@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from datagen.checks import (
-    check_disparity,
-    check_geometry,
-    check_gradient,
-    check_images,
-    check_object_index,
-    check_views,
-)
 from datagen.dataset import StereoSample, read_scene
 from datagen.errors import DatasetError
 from datagen.formats import read_camera_data
-from datagen.layout import EYES, FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, Eye, Layout
+from datagen.frame_check import FrameCheck
+from datagen.layout import EYES, FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, Layout
 from datagen.manifest import FileEntry, SceneManifest, read_manifest
 from datagen.raycast import SceneRayCaster
 from datagen.recipe import Recipe
@@ -70,7 +62,7 @@ class SceneCheck:
         try:
             manifest = read_manifest(path)
         except DatasetError as error:
-            self._found(path, str(error))
+            self._failed(error)
             return self
         self._check_head(path, manifest)
         self.known.update(entry.path for entry in manifest.files)
@@ -79,15 +71,19 @@ class SceneCheck:
         if self._are_readable([record]):
             try:
                 scene = read_scene(record)
+            except DatasetError as error:
+                self._failed(error)
+            else:
                 self._check_contents(scene, SceneRayCaster(scene) if self.sampled_pixels else None)
-            except ValueError as error:
-                self._found(record, str(error))
         return self
 
     def _found(self, path: Path, message: str) -> None:
-        """Note a problem; a message that begins with the path is not told it twice."""
-        message = message.removeprefix(f"{path}: ")
         self.problems.append(Problem(self.layout.relative(path), message, self.split, self.scene))
+
+    def _failed(self, error: ValueError) -> None:
+        """Note what a reader said; its sentence begins with the file's whole path."""
+        place, _, message = str(error).removeprefix(f"{self.layout.root}/").partition(": ")
+        self.problems.append(Problem(place, message, self.split, self.scene))
 
     def _check_head(self, path: Path, manifest: SceneManifest) -> None:
         if (manifest.split, manifest.scene) != (self.split, self.scene):
@@ -124,83 +120,41 @@ class SceneCheck:
     def _check_contents(self, scene: Scene, caster: SceneRayCaster | None) -> None:
         camera_data = self.layout.file("camera_data", self.split, self.scene)
         if self._are_readable([camera_data]):
-            for message in _check_camera_data(camera_data, scene):
-                self._found(camera_data, message)
+            self._check_camera_data(camera_data, scene)
         for instant in range(scene.frames):
             self.frames += 1
             if self._are_readable(self._frame_files(FIRST_FRAME + instant)):
-                self._check_frame(scene, caster, instant)
+                self._check_frame(scene, caster, FIRST_FRAME + instant)
 
     def _frame_files(self, frame: int) -> list[Path]:
         kinds = [RENDER_PASSES[name] for name in self.recipe.passes]
         kinds += [kind for kind in TARGETS if KINDS[kind].per_eye]
         return [self.layout.file(kind, self.split, self.scene, eye, frame) for kind in kinds for eye in EYES]
 
-    def _check_frame(self, scene: Scene, caster: SceneRayCaster | None, instant: int) -> None:
-        """Check the arrays of one frame, all of whose files are as they were written."""
-        frame = FIRST_FRAME + instant
-        folder = self.layout.scene_folder("disparity", self.split, self.scene)
-        samples = [
+    def _check_frame(self, scene: Scene, caster: SceneRayCaster | None, frame: int) -> None:
+        samples = tuple(
             StereoSample(self.layout, self.split, self.scene, frame, name) for name in self.recipe.passes
-        ]
+        )
         try:
-            for sample in samples:
-                path = self.layout.file(
-                    RENDER_PASSES[sample.render_pass], self.split, self.scene, "right", frame
-                )
-                for message in _check_pictures(sample, scene):
-                    self._found(path, message)
-            for eye in EYES:
-                path = self.layout.file("disparity", self.split, self.scene, eye, frame)
-                for message in self._check_targets(samples[0], eye, scene, caster, instant):
-                    self._found(path, message)
+            for path, message in FrameCheck(
+                samples, self.recipe, scene, caster, self.sampled_pixels
+            ).problems():
+                self._found(path, message)
         except DatasetError as error:
-            self._found(folder, str(error))
+            self._failed(error)
 
-    def _check_targets(
-        self, sample: StereoSample, eye: Eye, scene: Scene, caster: SceneRayCaster | None, instant: int
-    ) -> Iterator[str]:
-        view, other = (sample.view(eye), sample.view("right" if eye == "left" else "left"))
-        yield from check_disparity(view.disparity)
-        yield from check_gradient(
-            view.disparity, view.gradient, view.gradient_valid, self.recipe.gradient_threshold_px
-        )
-        yield from check_object_index(view.object_index, view.disparity, len(scene.objects))
-        yield from check_views(eye, view.disparity, other.disparity, view.occlusion)
-        if caster is None:
+    def _check_camera_data(self, path: Path, scene: Scene) -> None:
+        """The poses on disk are those of the scene's camera."""
+        try:
+            poses = read_camera_data(path)
+        except DatasetError as error:
+            self._failed(error)
             return
-        rng = np.random.default_rng((self.scene, instant, EYES.index(eye)))
-        pixels = rng.integers(0, view.disparity.size, self.sampled_pixels)
-        rows, columns = np.unravel_index(pixels, view.disparity.shape)
-        yield from check_geometry(
-            view.disparity[rows, columns],
-            view.object_index[rows, columns],
-            view.occlusion[rows, columns],
-            caster.cast(eye, instant, rows, columns),
-        )
-
-
-def _check_camera_data(path: Path, scene: Scene) -> Iterator[str]:
-    """The poses on disk are those of the scene's camera."""
-    try:
-        poses = read_camera_data(path)
-    except DatasetError as error:
-        yield str(error)
-        return
-    expected = {FIRST_FRAME + k: [scene.camera.pose(eye, k) for eye in EYES] for k in range(scene.frames)}
-    if poses.keys() != expected.keys():
-        yield f"has the frames {sorted(poses)} where the scene has {sorted(expected)}"
-        return
-    for frame, matrices in poses.items():
-        if not np.allclose(matrices, expected[frame], rtol=0, atol=POSE_TOLERANCE):
-            yield f"the poses of frame {frame} are not those of the scene's camera"
-
-
-def _check_pictures(sample: StereoSample, scene: Scene) -> Iterator[str]:
-    """The pictures have the camera's size, and belong to the disparity."""
-    size = (scene.camera.height, scene.camera.width)
-    if sample.size != size:
-        raise DatasetError(
-            f"the images of {sample.name} are {sample.size} where the scene's camera makes {size}"
-        )
-    yield from check_images(sample.left, sample.right, sample.disparity_left, sample.occlusion_left)
+        camera = scene.camera
+        expected = {FIRST_FRAME + k: [camera.pose(eye, k) for eye in EYES] for k in range(scene.frames)}
+        if poses.keys() != expected.keys():
+            self._found(path, f"has the frames {sorted(poses)} where the scene has {sorted(expected)}")
+            return
+        for frame, matrices in poses.items():
+            if not np.allclose(matrices, expected[frame], rtol=0, atol=POSE_TOLERANCE):
+                self._found(path, f"the poses of frame {frame} are not those of the scene's camera")
