@@ -63,8 +63,10 @@ class RegionScore:
     bad: float
     """Share of bad pixels, 0..1; NaN where the region has no pixels or the method no disparity."""
     epe: float
-    """Mean |d - d*| in pixels."""
+    """Mean |d - d*| in pixels, where there is an estimate."""
     pixels: int
+    missing: int
+    """Those of the pixels for which the method gives no disparity: bad, and left out of the mean error."""
 
 
 @dataclass(frozen=True)
@@ -294,7 +296,7 @@ class _Pool:
     def score(self) -> MethodScore:
         return MethodScore(
             regions={
-                name: RegionScore(pool.bad_pixel_rate, pool.end_point_error, pool.pixels)
+                name: RegionScore(pool.bad_pixel_rate, pool.end_point_error, pool.pixels, pool.missing)
                 for name, pool in self.regions.items()
             },
             gradient_masked=self.masked.gradient_error,

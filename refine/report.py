@@ -12,6 +12,7 @@ from refine.report_tables import (
     confidence_table,
     error_table,
     frame_table,
+    missing_notes,
     ratio_tables,
     summary_tiles,
 )
@@ -72,6 +73,7 @@ def report_html(evaluation: Evaluation, context: ReportContext) -> str:
         threshold=f"{evaluation.options.bad_threshold:g}",
         tiles=summary_tiles(evaluation),
         errors=error_table(evaluation),
+        missing=missing_notes(evaluation),
         ratios=ratio_tables(evaluation),
         confidences=confidence_table(evaluation),
         frame_rows=frame_table(evaluation),

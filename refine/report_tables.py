@@ -113,6 +113,21 @@ def error_table(evaluation: Evaluation) -> Table:
     )
 
 
+def missing_notes(evaluation: Evaluation) -> list[str]:
+    """A sentence for each method without a disparity at some pixels, whose EPE is therefore of the others
+    only."""
+    notes = []
+    for name, score in evaluation.scores.items():
+        region = score.regions["all"]
+        if region.missing:
+            share = region.missing / region.pixels * 100
+            notes.append(
+                f"{evaluation.labels[name]} gives no disparity at {share:.1f} % of the pixels: they count as bad, "
+                "and its EPE is that of the others."
+            )
+    return notes
+
+
 def ratio_tables(evaluation: Evaluation) -> list[tuple[str, Table]]:
     """For each method that both have, its errors divided by the regressor's, here and in the paper; ours
     first."""

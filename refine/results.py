@@ -17,13 +17,14 @@ from refine.evaluation import REGIONS, Evaluation, MethodScore
 from refine.metrics import SparsificationCurve, optimal_curve
 
 MEASURES = (
-    *(f"{measure}_{region}" for region in REGIONS for measure in ("bad", "epe", "pixels")),
+    *(f"{measure}_{region}" for region in REGIONS for measure in ("bad", "epe", "pixels", "missing")),
     "gradient_masked",
     "gradient_all",
     "seconds",
     "auc",
 )
-"""Columns of numbers. bad: share 0..1; epe: pixels; gradient: pixels a pixel; seconds: a frame; auc: 0..1."""
+"""Columns of numbers. bad: share 0..1; epe: pixels; pixels, missing: counts; gradient: pixels a pixel;
+seconds: a frame; auc: 0..1."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,8 @@ def results_json(evaluation: Evaluation, about: Mapping[str, Any]) -> str:
 def _method_values(score: MethodScore) -> dict[str, float]:
     values: dict[str, float] = {}
     for name, region in score.regions.items():
-        values |= {f"bad_{name}": region.bad, f"epe_{name}": region.epe, f"pixels_{name}": region.pixels}
+        for measure, value in asdict(region).items():
+            values[f"{measure}_{name}"] = value
     return values | {
         "gradient_masked": score.gradient_masked,
         "gradient_all": score.gradient_all,

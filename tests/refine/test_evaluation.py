@@ -135,6 +135,13 @@ def test_nothing_to_do_is_an_error():
         evaluate([bare], [Regressor(), Regressor()])
 
 
+def test_missing_estimates_are_counted():
+    frame = flat_frame("f", [[0, 0, float("nan")], [0, 0, 3]], [[0, 0, 1], [0, 0, 1]])
+    regions = evaluate([frame], [Regressor()]).scores["regressor"].regions
+    assert (regions["all"].pixels, regions["all"].missing, regions["all"].bad) == (6, 1, 2 / 6)
+    assert (regions["occ"].epe, regions["all"].epe) == (3.0, pytest.approx(3 / 5))
+
+
 def test_the_first_and_the_worst_frames_are_kept():
     frames = [
         flat_frame(str(error), [[error] * 3] * 2, [[0] * 3] * 2) for error in (0.5, 3.0, 1.0, 9.0, 2.0, 0.25)

@@ -159,11 +159,13 @@ def test_writing_again_replaces_and_leaves_no_litter(evaluation, written):
 
 def test_a_report_of_one_frame_without_networks(tmp_path):
     frame = replace(toy_frame(0), confidence=None, gradient=None, truth=np.full((48, 80), 8.0, np.float32))
+    frame.disparity[:12] = np.nan
     files = write_report(evaluate([frame]), tmp_path)
     parser = Page()
     parser.feed(files.html.read_text())
     assert parser.open == []
     assert "Not run: Ours needs confidence and gradient, which the frames lack." in parser.text
+    assert "Regressor gives no disparity at 25.0 % of the pixels" in parser.text
 
 
 def test_the_lens_looks_at_the_worst_boundary():
