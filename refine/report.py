@@ -83,6 +83,10 @@ def report_html(evaluation: Evaluation, context: ReportContext) -> str:
         ),
         auc_plot=svg(auc_figure(evaluation.frames)) if len(evaluation.frames) > 1 else "",
         panels=[panel_view(evaluation, panel) for panel in evaluation.first],
-        worst=[panel_view(evaluation, panel) for panel in evaluation.worst if panel.order not in shown],
+        worst=[
+            panel_view(evaluation, panel, failure=True)
+            for panel in evaluation.worst
+            if panel.order not in shown
+        ],
         worst_shown_above=[panel.frame.name for panel in evaluation.worst if panel.order in shown],
     )

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from refine.evaluation import Evaluation, FrameScore, Panel
-from refine.lens import boundary_window
+from refine.lens import most_improved_boundary, worst_boundary
 from refine.metrics import SparsificationCurve, optimal_curve
 from refine.report_tables import BOUNDS, CONFIDENCE_LABELS
 from viewing import (
@@ -40,6 +40,7 @@ class Lens:
     refined: Picture
     truth: Picture
     place: str
+    """Why here, and where that is."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,11 @@ class PanelView:
     lens: Lens | None
 
 
-def panel_view(evaluation: Evaluation, panel: Panel) -> PanelView:
-    """Paint one kept frame: all disparities on the scale of the ground truth."""
+def panel_view(evaluation: Evaluation, panel: Panel, failure: bool = False) -> PanelView:
+    """Paint one kept frame: all disparities on the scale of the ground truth.
+
+    The close-up shows what refinement does at its best, or for a `failure` at its worst.
+    """
     frame, refined = panel.frame, panel.disparities[evaluation.judged]
     threshold = evaluation.options.bad_threshold
     label = evaluation.labels[evaluation.judged]
@@ -90,7 +94,7 @@ def panel_view(evaluation: Evaluation, panel: Panel) -> PanelView:
         initial=initial_picture,
         refined=refined_picture,
         refined_label=label,
-        lens=_lens(panel, refined),
+        lens=_lens(panel, refined, failure),
     )
 
 
@@ -127,9 +131,14 @@ def auc_figure(frames: Sequence[FrameScore]) -> Figure:
     )
 
 
-def _lens(panel: Panel, refined: NDArray[np.float32]) -> Lens | None:
+def _lens(panel: Panel, refined: NDArray[np.float32], failure: bool) -> Lens | None:
     frame = panel.frame
-    window = boundary_window(frame.disparity, frame.truth, LENS_SIZE)
+    if failure:
+        reason = "the depth boundary where the result is worst"
+        window = worst_boundary(refined, frame.truth, LENS_SIZE)
+    else:
+        reason = "the depth boundary where refinement changes most for the better"
+        window = most_improved_boundary(frame.disparity, refined, frame.truth, LENS_SIZE)
     if window is None:
         return None
     truth = frame.truth[window]
@@ -139,7 +148,7 @@ def _lens(panel: Panel, refined: NDArray[np.float32]) -> Lens | None:
         for values in (frame.disparity[window], refined[window], truth)
     )
     rows, columns = window
-    place = f"columns {columns.start}–{columns.stop - 1}, rows {rows.start}–{rows.stop - 1}"
+    place = f"{reason}, columns {columns.start}–{columns.stop - 1}, rows {rows.start}–{rows.stop - 1}"
     return Lens(enlarged(frame.image[window], LENS_ZOOM), initial_view, refined_view, truth_view, place)
 
 

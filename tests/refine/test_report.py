@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from refine.evaluation import evaluate
-from refine.lens import boundary_window
+from refine.lens import most_improved_boundary, worst_boundary
 from refine.overview import overview_picture
 from refine.report import ReportContext, write_report
 from tests.refine.worlds import toy_frame
@@ -168,15 +168,37 @@ def test_a_report_of_one_frame_without_networks(tmp_path):
     assert "Regressor gives no disparity at 25.0 % of the pixels" in parser.text
 
 
-def test_the_lens_looks_at_the_worst_boundary():
+def brute_force_window(score: np.ndarray, size: tuple[int, int]) -> tuple[slice, slice]:
+    """The window of the largest sum, by trying all of them."""
+    windows = [
+        (slice(y, y + size[0]), slice(x, x + size[1]))
+        for y in range(score.shape[0] - size[0] + 1)
+        for x in range(score.shape[1] - size[1] + 1)
+    ]
+    return max(windows, key=lambda window: score[window].sum())
+
+
+def test_the_lens_finds_the_boundary_with_most_error_or_gain():
     frame = toy_frame(3)
-    rows, columns = boundary_window(frame.disparity, frame.truth, (16, 20))
-    assert (rows.stop - rows.start, columns.stop - columns.start) == (16, 20)
-    halo = np.abs(frame.disparity - frame.truth) > 5
-    assert halo[rows, columns].sum() > 40
-    assert boundary_window(frame.disparity, np.full_like(frame.truth, 5), (16, 20)) is None
-    whole = boundary_window(frame.disparity, frame.truth, (500, 500))
+    halo = np.abs(frame.disparity - frame.truth) > 3
+    refined = frame.disparity.copy()
+    refined[:, 40:] = frame.truth[:, 40:]
+    size = (16, 20)
+    worst = worst_boundary(refined, frame.truth, size)
+    gain = most_improved_boundary(frame.disparity, refined, frame.truth, size)
+    assert halo[worst].sum() >= 0.9 * halo[brute_force_window(halo[:, :40], size)].sum()
+    assert worst[1].start < 40 <= gain[1].start + 1
+    right_halo = halo & (np.arange(80) >= 40)
+    assert halo[gain].sum() >= 0.9 * right_halo[brute_force_window(right_halo, size)].sum()
+
+
+def test_the_lens_stays_in_the_frame_and_needs_a_boundary():
+    frame = toy_frame(3)
+    assert worst_boundary(frame.disparity, np.full_like(frame.truth, 5), (16, 20)) is None
+    whole = worst_boundary(frame.disparity, frame.truth, (500, 500))
     assert frame.truth[whole].shape == frame.truth.shape
+    odd = worst_boundary(frame.disparity, frame.truth, (47, 79))
+    assert frame.truth[odd].shape == (47, 79)
 
 
 def test_the_overview_shows_four_pictures_of_the_pairs_shape():
