@@ -31,8 +31,10 @@ seconds: a frame; auc: 0..1."""
 class ResultRow:
     """The measures of one method, or one confidence measure, over one frame or the whole set."""
 
+    order: int | None
+    """Place of the frame in the set, from 0; None for the whole set."""
     frame: str
-    """Empty for the whole set."""
+    """The frame's name; empty for the whole set."""
     kind: str
     """"method" or "confidence"."""
     name: str
@@ -43,14 +45,14 @@ class ResultRow:
 def result_rows(evaluation: Evaluation) -> Iterator[ResultRow]:
     """Every number of an evaluation, the whole set first, then frame by frame in the order they came."""
     for name, score in evaluation.scores.items():
-        yield ResultRow("", "method", name, _method_values(score))
+        yield ResultRow(None, "", "method", name, _method_values(score))
     for name, auc in mean_aucs(evaluation).items():
-        yield ResultRow("", "confidence", name, {"auc": auc})
-    for frame in evaluation.frames:
+        yield ResultRow(None, "", "confidence", name, {"auc": auc})
+    for order, frame in enumerate(evaluation.frames):
         for name, score in frame.methods.items():
-            yield ResultRow(frame.name, "method", name, _method_values(score))
+            yield ResultRow(order, frame.name, "method", name, _method_values(score))
         for name, auc in frame.aucs.items():
-            yield ResultRow(frame.name, "confidence", name, {"auc": auc})
+            yield ResultRow(order, frame.name, "confidence", name, {"auc": auc})
 
 
 def mean_aucs(evaluation: Evaluation) -> dict[str, float]:
@@ -99,10 +101,11 @@ def results_json(evaluation: Evaluation, about: Mapping[str, Any]) -> str:
         "options": asdict(evaluation.options),
         "skipped": evaluation.skipped,
         "set": {"methods": {}, "confidences": {}},
-        "frames": {frame.name: {"methods": {}, "confidences": {}} for frame in evaluation.frames},
+        # A list: frames of two data sets may share a name.
+        "frames": [{"name": frame.name, "methods": {}, "confidences": {}} for frame in evaluation.frames],
     }
     for row in result_rows(evaluation):
-        place = document["frames"][row.frame] if row.frame else document["set"]
+        place = document["set"] if row.order is None else document["frames"][row.order]
         numbers = {key: None if math.isnan(value) else value for key, value in row.values.items()}
         place[f"{row.kind}s"][row.name] = numbers
     return json.dumps(document, indent=1, allow_nan=False) + "\n"

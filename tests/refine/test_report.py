@@ -111,9 +111,10 @@ def test_what_the_context_says_is_on_the_page_and_escaped(written, page):
 def test_csv_json_and_page_hold_the_same_numbers(evaluation, written, page):
     rows = list(csv.DictReader(written.csv.read_text().splitlines()))
     document = json.loads(written.json.read_text())
+    frames = {frame["name"]: frame for frame in document["frames"]}
     assert len(rows) == 4 + 4 + 6 * (4 + 3) + 1
     for row in rows:
-        place = document["frames"][row["frame"]] if row["frame"] else document["set"]
+        place = frames[row["frame"]] if row["frame"] else document["set"]
         numbers = place[f"{row['kind']}s"][row["name"]]
         for measure, value in row.items():
             if measure not in ("frame", "kind", "name"):
@@ -129,6 +130,15 @@ def test_csv_json_and_page_hold_the_same_numbers(evaluation, written, page):
     assert document["about"]["limits"] == ["These are toys."]
     mean_auc = np.mean([frame.aucs["confnet"] for frame in evaluation.frames])
     assert document["set"]["confidences"]["confnet"]["auc"] == pytest.approx(mean_auc)
+
+
+def test_frames_that_share_a_name_keep_their_own_numbers(tmp_path):
+    frames = [toy_frame(seed) for seed in (0, 1)]
+    evaluation = evaluate([frames[0], replace(frames[1], name=frames[0].name)])
+    document = json.loads(write_report(evaluation, tmp_path).json.read_text())
+    errors = [frame["methods"]["ours"]["epe_all"] for frame in document["frames"]]
+    assert errors == [frame.methods["ours"].regions["all"].epe for frame in evaluation.frames]
+    assert errors[0] != errors[1]
 
 
 def test_ratios_stand_beside_the_papers(evaluation, page):
