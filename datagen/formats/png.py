@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -27,12 +28,12 @@ def read_png(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
     path = Path(path)
     data = read_bounded(path)
     _check_chunks(path, data)
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise FormatError(f"{path}: is a PNG file whose pixels do not decode")
     if image.ndim == 3:
         image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB if image.shape[2] == 3 else cv2.COLOR_BGRA2RGBA)
-    return image  # type: ignore[no-any-return]
+    return np.asarray(image)
 
 
 def read_png_size(path: Path | str) -> tuple[int, int]:
