@@ -98,7 +98,9 @@ def spectral_noise(
     """
     height, width = (size, size) if isinstance(size, int) else size
     gain = _spectral_gain(height, width, slope, low_cycles, high_cycles, stretch)
-    spectrum = rng.standard_normal((height, 2 * gain.shape[1]), dtype=np.float32).view(np.complex64) * gain
+    # Uniform draws are several times faster than normal ones, and the sum over all waves is normal anyway.
+    spectrum = (rng.random((height, 2 * gain.shape[1]), np.float32) - np.float32(0.5)).view(np.complex64)
+    spectrum *= gain
     noise: Field = fft.irfft2(spectrum, s=(height, width), overwrite_x=True)
     noise *= np.float32(1 / max(float(noise.std()), 1e-12))
     return noise
@@ -135,7 +137,7 @@ def colorize(value: Field, palette: Palette) -> Picture:
     stops = np.linspace(0.0, 1.0, len(palette))
     fine = np.linspace(0.0, 1.0, 512)
     table = np.array([np.interp(fine, stops, [color[c] for color in palette]) for c in range(3)], np.float32)
-    index = (np.clip(value, 0, 1) * np.float32(511) + np.float32(0.5)).astype(np.int32)
+    index = (np.clip(value, 0, 1) * np.float32(511) + np.float32(0.5)).astype(np.intp)
     return np.take(table, index, axis=1)
 
 
@@ -153,7 +155,9 @@ def smooth_step(value: Field, edge: float, width: float) -> Field:
 
 def mix(below: Picture, above: Picture, cover: Field) -> Picture:
     """`above` painted over `below` with an opacity (H, W)."""
-    return below + (above - below) * cover
+    painted = (above - below) * cover
+    painted += below
+    return painted
 
 
 def finish(picture: Picture, rng: np.random.Generator, grain: float) -> NDArray[np.uint8]:
@@ -162,14 +166,17 @@ def finish(picture: Picture, rng: np.random.Generator, grain: float) -> NDArray[
     `grain` is the standard deviation of the noise relative to the brightness: detail at the scale of one
     and two pixels, which is what stereo matching lives on where a pattern has none.
     """
-    fine = rng.standard_normal(picture.shape[1:], dtype=np.float32)
+    fine = (rng.random(picture.shape[1:], np.float32) - np.float32(0.5)) * np.float32(np.sqrt(12.0))
     noise = fine + np.roll(fine, 1, 0)
     noise += np.roll(noise, 1, 1)
     noise *= np.float32(0.4 * grain)
     noise += np.float32(0.6 * grain) * fine
     noise += 1
     # A little grain in the blacks too.
-    return to_bytes((picture + np.float32(12)) * noise - np.float32(12))
+    grained = picture + np.float32(12)
+    grained *= noise
+    grained -= np.float32(12)
+    return to_bytes(grained)
 
 
 def to_bytes(picture: Picture) -> NDArray[np.uint8]:

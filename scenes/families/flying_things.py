@@ -78,7 +78,7 @@ class FlyingThingsConfig(FamilyConfig):
     """How far the camera leans."""
     suns: Count = (1, 2)
     area_lights: Count = (0, 4)
-    sky_strength: Range = (0.5, 1.4)
+    sky_strength: Range = (0.7, 1.8)
     """Brightness of the sky's light."""
 
     def __post_init__(self) -> None:
@@ -116,9 +116,8 @@ class _Rig:
     @property
     def half_view(self) -> tuple[float, float]:
         """Tangents of half the horizontal and half the vertical field of view."""
-        return tuple(  # type: ignore[return-value]
-            side / 2 / self.camera.focal_px for side in (self.camera.width, self.camera.height)
-        )
+        focal_px = self.camera.focal_px
+        return self.camera.width / 2 / focal_px, self.camera.height / 2 / focal_px
 
     def point(self, right: float, up: float, depth_m: float) -> NDArray[np.float64]:
         """World point at an image position (-1..1 is the frame, seen from between the eyes) and depth."""

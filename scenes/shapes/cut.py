@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 from manifold3d import Manifold
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.drawing import choose, integer, log_uniform, new_seed, uniform
@@ -28,7 +29,7 @@ def _primitive(kind: str) -> Manifold:
 _KINDS = ("cube", "cylinder", "sphere")
 
 
-def _placed(body: Manifold, rotation: Rotation, scale: float, offset: np.ndarray) -> Manifold:  # type: ignore[type-arg]
+def _placed(body: Manifold, rotation: Rotation, scale: float, offset: NDArray[np.float64]) -> Manifold:
     matrix = np.column_stack([rotation.as_matrix() * scale, offset])
     return body.transform(matrix)
 

@@ -56,7 +56,7 @@ class Layered(Texture):
     softness: float
     """Width of the transition, in standard deviations of the mask's noise."""
 
-    popularity: ClassVar[float] = 2.5
+    popularity: ClassVar[float] = 2.0
 
     @classmethod
     def sample(cls, rng: np.random.Generator, size: int) -> Self:

@@ -101,7 +101,7 @@ class DeadLeaves(Texture):
             seed=new_seed(rng),
             palette=sample_palette(rng, integer(rng, 4, 10)),
             corners=choose(rng, [0, 0, 4, 4, 3, -1, -1, -1]),
-            figures=integer(rng, 120, 320),
+            figures=integer(rng, 100, 260),
             smallest=uniform(rng, 2.0, 6.0),
             largest=uniform(rng, 0.12, 0.25),
             grain=uniform(rng, 0.03, 0.12),

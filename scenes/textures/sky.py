@@ -65,7 +65,7 @@ class Sky(Texture):
             horizon=colors[1],
             ground=colors[2],
             cloud=colors[3],
-            cloud_cover=uniform(rng, 0.0, 1.0),
+            cloud_cover=uniform(rng, 0.0, 1.0) ** 1.5,
             glow=uniform(rng, 0.0, 1.0),
             sun_azimuth=uniform(rng, 0.0, 1.0),
             sun_elevation_deg=uniform(rng, 5.0, 60.0),
@@ -98,5 +98,5 @@ class Sky(Texture):
         # A layer of clouds in perspective: near the horizon, rows of the noise pass ever faster.
         field = noise[(rows * (1 - up[:, 0]) ** np.float32(0.6)).astype(np.int32)]
         density = smooth_step(field, 1.8 - 3.2 * self.cloud_cover, 1.0) * smooth_step(up, 0.03, 0.12)
-        light = 1 - np.float32(0.2) * smooth_step(np.roll(field, -3, axis=0), 0.4, 1.8)
+        light = 1 - np.float32(0.15) * smooth_step(np.roll(field, -3, axis=0), 0.4, 1.8)
         return mix(sky, paint(self.cloud) * light, density * np.float32(0.9))

@@ -287,9 +287,8 @@ class Weave(Texture):
         across = np.abs(np.where(weft_on_top, v % 1, u % 1) - np.float32(0.5))
         height = np.cos(np.pi * along) * (1 - (2 * across) ** 2 * np.float32(0.6))
         band = 1 - smooth_step(across, 0.5 - self.gap / 2, 0.12)
-        tones = to_unit(spectral_noise(rng, self.size, 0.8, 2, stretch=(1.0, 1.0)))
+        tones = to_unit(spectral_noise(rng, self.size, 0.8, 2))
         color = flat_colors(weft_on_top.astype(np.int32), self.palette)
-        light = (np.float32(0.25) + np.float32(0.75) * height * band) * (
-            np.float32(0.75) + np.float32(0.5) * tones
-        )
-        return finish(color * np.clip(light, 0.08, 1.3), rng, self.grain)
+        shade = np.float32(0.3) + np.float32(0.9) * np.sqrt(np.abs(height)) * band
+        light = shade * (np.float32(0.75) + np.float32(0.5) * tones)
+        return finish(color * light, rng, self.grain)

@@ -46,7 +46,7 @@ def test_mistakes_are_named(scene: Scene) -> None:
         scene_from_json("{")
     data = json.loads(scene_to_json(scene))
     data["objects"][0]["shape"]["kind"] = "os.system"
-    with pytest.raises(ValueError, match=r"known 'kind'.*os\.system"):
+    with pytest.raises(ValueError, match=r"a Shape needs 'kind'.*os\.system"):
         scene_from_json(json.dumps(data))
     data = json.loads(scene_to_json(scene))
     data["camera"]["focal_inches"] = 1.4
