@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from datagen.exposure import automatic_exposure, develop
 from datagen.ground_truth import (
-    EYES,
-    Eye,
     OcclusionTester,
     RectifiedPair,
     disparity_from_depth,
@@ -22,6 +20,7 @@ from datagen.ground_truth import (
     gradient_validity,
     to_camera_frame,
 )
+from datagen.layout import EYES, Eye
 from scenes import Scene
 
 BLENDER_LOG = "blender.log"

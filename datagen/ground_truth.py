@@ -7,18 +7,17 @@ through its centre (j + 0.5, i + 0.5); the principal point is the image's middle
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from datagen.layout import Eye
+
 VISIBLE, OCCLUDED, OUT_OF_FRAME = 0, 1, 2
 """Labels of an occlusion map."""
 
-Eye = Literal["left", "right"]
-EYES: tuple[Eye, Eye] = ("left", "right")
 
 SAME_SURFACE = 1e-4
 """Share of the distance within which a hit still counts as the surface itself.

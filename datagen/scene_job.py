@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ import numpy as np
 from datagen.formats import write_camera_data, write_gradient, write_occlusion, write_pfm, write_png
 from datagen.formats.atomic import write_text
 from datagen.frames import BLENDER_LOG, EyeTargets, RenderOptions, Stopwatch, render_frames
-from datagen.ground_truth import EYES, OCCLUDED, OUT_OF_FRAME, Eye
-from datagen.layout import FIRST_FRAME, Layout
+from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME
+from datagen.layout import EYES, FIRST_FRAME, Eye, Layout
 from datagen.manifest import SceneManifest, file_entry, write_manifest
 from datagen.recipe import Recipe
 from scenes import Scene, scene_to_json
@@ -125,7 +126,11 @@ def _commit(job: SceneJob, watch: Stopwatch, statistics: dict[str, Any]) -> Scen
         files=tuple(file_entry(job.staging, path) for path in files),
         seconds=watch.seconds,
         statistics=statistics,
-        versions={"blender": blender_version(), "numpy": np.__version__},
+        versions={
+            "stereoforge": version("stereoforge"),
+            "blender": blender_version(),
+            "numpy": np.__version__,
+        },
     )
     for source in sorted({_unit(path) for path in files}):
         target = job.root / source.relative_to(job.staging)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from datagen.frames import EyeTargets, RenderOptions, render_frames
-from datagen.ground_truth import EYES, OCCLUDED, VISIBLE, Eye, to_camera_frame
+from datagen.ground_truth import OCCLUDED, VISIBLE, to_camera_frame
+from datagen.layout import EYES, Eye
 from scenes import FAMILIES, Scene, sample_scene
 from tests.datagen.oracle import cast_depth
 
@@ -42,7 +43,7 @@ def worlds(tmp_path_factory: pytest.TempPathFactory) -> list[World]:
         for seed in range(SCENES_PER_SIZE):
             config = FAMILIES["flying_things"].config(width=width, height=height)
             scene = sample_scene(np.random.default_rng([seed, width]), "flying_things", config)
-            frames = render_frames(scene, tmp_path_factory.mktemp("blender"), RenderOptions(samples=16))
+            frames = render_frames(scene, tmp_path_factory.mktemp("blender"), RenderOptions(samples=4))
             _, targets = next(frames)
             from datagen.blender.geometry import evaluated_triangles
 

@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from datagen.frames import EyeTargets, render_frames
-from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, VISIBLE, Eye
+from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.layout import Eye
 from tests.datagen.worlds import BASELINE_M, Plate, plates
 
 WIDTH, HEIGHT = 192, 108
