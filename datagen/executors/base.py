@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeAlias, TypeVar
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -19,9 +19,13 @@ class Outcome(Generic[Job, Result]):
     error: str | None = None
 
 
+Outcomes: TypeAlias = Generator[Outcome[Job, Result], None, None]
+"""Outcomes as they come; to be closed when no more of them are wanted."""
+
+
 class Executor(Protocol):
     """Runs jobs somewhere. Closing the iterator early stops the work and leaves no process behind."""
 
-    def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Generator[Outcome[Job, Result], None, None]:
+    def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Outcomes[Job, Result]:
         """Call a picklable function on every job, yielding outcomes as they come, in any order."""
         ...

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -11,7 +11,7 @@ from typing import Any
 
 from pebble import ProcessExpired, ProcessPool
 
-from datagen.executors.base import Job, Outcome, Result
+from datagen.executors.base import Job, Outcome, Outcomes, Result
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class LocalExecutor:
     jobs_per_worker: int = 40
     """A worker is replaced after so many jobs: Blender's memory grows slowly."""
 
-    def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Generator[Outcome[Job, Result], None, None]:
+    def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Outcomes[Job, Result]:
         queue = iter(jobs)
         pool = ProcessPool(
             max_workers=self.workers,
