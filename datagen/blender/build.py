@@ -97,6 +97,8 @@ def _build_light(index: int, light: Light, blender_scene: bpy.types.Scene) -> No
     block = bpy.data.objects.new(lamp.name, lamp)
     block.location = position
     block.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
+    # Cycles would show the lamp's own glowing square to an eye that happens to look at it.
+    block.visible_camera = False
     blender_scene.collection.objects.link(block)
 
 
