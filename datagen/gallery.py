@@ -16,6 +16,7 @@ from datagen.layout import SPLITS, Layout
 from datagen.manifest import SceneManifest, read_manifest
 from datagen.recipe import Recipe, read_recipe
 from datagen.statistics import TEXTURE_DEVIATION, TEXTURE_WINDOW_PX, SetStatistics, measure
+from storage import write_text
 from viewing import (
     Picture,
     disparity_picture,
@@ -24,7 +25,6 @@ from viewing import (
     occlusion_picture,
     render_page,
     shrunk,
-    write_atomically,
 )
 from viewing.pictures import OCCLUDED_COLOR, OUT_OF_FRAME_COLOR
 from viewing.plots import histogram, svg
@@ -106,7 +106,7 @@ def write_gallery(
             recipe, read_manifest(layout.manifest(splits[0], layout.committed_scenes(splits[0])[0]))
         ),
     )
-    write_atomically(Path(out_html), page)
+    write_text(Path(out_html), page)
 
 
 def evenly_spaced(items: Sequence[T], count: int) -> list[T]:

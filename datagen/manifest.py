@@ -10,8 +10,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any, TypeVar
 
 from datagen.errors import DatasetError
-from datagen.formats.atomic import write_text
 from datagen.formats.limits import read_bounded
+from storage import write_text
 
 T = TypeVar("T")
 

@@ -12,10 +12,10 @@ import numpy as np
 import yaml
 
 from datagen.errors import DatasetError
-from datagen.formats.atomic import write_text
 from datagen.layout import SPLITS
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
 from scenes.serialization import from_plain, to_plain
+from storage import write_text
 
 PASSES = ("clean",)
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from datagen.formats import write_camera_data, write_gradient, write_occlusion, write_pfm, write_png
-from datagen.formats.atomic import write_text
 from datagen.frames import BLENDER_LOG, EyeTargets, RenderOptions, Stopwatch, render_frames
 from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME
 from datagen.layout import EYES, FIRST_FRAME, Eye, Layout
 from datagen.manifest import SceneManifest, file_entry, write_manifest
 from datagen.recipe import Recipe
 from scenes import Scene, scene_to_json
+from storage import write_text
 
 STAGING_FOLDER = ".staging"
 

@@ -20,13 +20,13 @@ from refine.weights import Floats
 SolverName = Literal["auto", "multigrid", "cg", "direct"]
 
 DEFAULT_TOLERANCE = 1e-6
-"""Relative residual at which the iterative solvers stop. At 960x540 it left single pixels 0.003 to 0.03 from the
-exact solution, the most where confidence is zero over large textured areas; mean errors are final at 1e-3."""
+"""Relative residual at which the iterative solvers stop. At 960x540 it left single pixels 0.003 to 0.03 from
+the exact solution, the most where confidence is zero over large textured areas; mean errors are final at
+1e-3."""
 
 _SOLVERS = {"multigrid": solve_multigrid, "cg": solve_cg, "direct": solve_direct}
-_DIRECT_UP_TO_PIXELS = {"exact": 4096, "paper": 100_000}
-"""Up to these sizes "auto" takes the direct solver, which is exact and there no slower: the paper's matrix
-has 9 entries a row where the exact one has 25, and far less fill-in."""
+_DIRECT_UP_TO_PIXELS = 4096
+"""Up to this size "auto" takes the direct solver: tens of milliseconds either way, and exact."""
 
 
 class ConvergenceWarning(UserWarning):
@@ -119,7 +119,7 @@ def solve_mrf(
     start = initial.ravel()
     name = solver
     if solver == "auto":
-        name = "direct" if start.size <= _DIRECT_UP_TO_PIXELS[form] else "multigrid"
+        name = "direct" if start.size <= _DIRECT_UP_TO_PIXELS else "multigrid"
     solution, used = _solve(system, start, name, tolerance)
     info = SolveInfo(
         solver=used,

@@ -17,7 +17,8 @@ from refine.report_tables import (
     summary_tiles,
 )
 from refine.results import mean_curves, results_csv, results_json
-from viewing import render_page, write_atomically
+from storage import write_text
+from viewing import render_page
 from viewing.plots import svg
 
 
@@ -54,9 +55,9 @@ def write_report(
     """
     files = ReportFiles(out / "report.html", out / "results.csv", out / "results.json")
     about = {"title": context.title, **context.facts, "limits": list(context.limits)}
-    write_atomically(files.csv, results_csv(evaluation))
-    write_atomically(files.json, results_json(evaluation, about))
-    write_atomically(files.html, report_html(evaluation, context))
+    write_text(files.csv, results_csv(evaluation))
+    write_text(files.json, results_json(evaluation, about))
+    write_text(files.html, report_html(evaluation, context))
     return files
 
 

@@ -63,6 +63,7 @@ class RunProgress(pl.Callback):
             TimeRemainingColumn(),
             console=self._console,
             transient=True,
+            disable=not self._console.is_terminal,
         )
         self._title = title
 

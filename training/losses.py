@@ -8,7 +8,10 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
 
-STAGE_WEIGHTS: tuple[tuple[float, ...], ...] = (
+ScaleWeights = tuple[float, ...]
+"""Weights of the losses at 1/64, 1/32, .. 1/2."""
+
+STAGE_WEIGHTS: tuple[ScaleWeights, ...] = (
     (1.0, 0.2, 0.0, 0.0, 0.0, 0.0),
     (0.5, 1.0, 0.2, 0.0, 0.0, 0.0),
     (0.0, 0.5, 1.0, 0.2, 0.0, 0.0),
@@ -17,24 +20,25 @@ STAGE_WEIGHTS: tuple[tuple[float, ...], ...] = (
     (0.0, 0.0, 0.0, 0.0, 0.5, 1.0),
     (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
 )
-"""Weights of the losses at 1/64, 1/32, .. 1/2 (columns), one row a stage, from coarse to fine: DispNet's
-training schedule as its authors gave it."""
+"""One row a stage, from coarse to fine: DispNet's training schedule as its authors gave it."""
+
+STATIC_WEIGHTS: ScaleWeights = (0.2, 0.2, 0.2, 0.2, 0.2, 1.0)
+"""The weights in DispNet's released training definition, which started from trained weights."""
 
 
-def stage_weights(step: int, stage_ends: Sequence[int]) -> tuple[float, ...]:
-    """The row of `STAGE_WEIGHTS` in force at a step.
+def stage_weights(step: int, stages: Sequence[ScaleWeights], ends: Sequence[int]) -> ScaleWeights:
+    """The weights in force at a step.
 
     Args:
-        stage_ends: step at which each stage but the last ends; six numbers that do not decrease.
+        stages: the weights of each stage.
+        ends: step at which each stage but the last ends, not decreasing.
 
     Raises:
-        ValueError: `stage_ends` has another length.
+        ValueError: the numbers of stages and ends do not fit.
     """
-    if len(stage_ends) != len(STAGE_WEIGHTS) - 1:
-        raise ValueError(
-            f"{len(STAGE_WEIGHTS)} loss stages need {len(STAGE_WEIGHTS) - 1} ends, got {stage_ends}"
-        )
-    return STAGE_WEIGHTS[sum(step >= end for end in stage_ends)]
+    if len(ends) != len(stages) - 1:
+        raise ValueError(f"{len(stages)} loss stages need {len(stages) - 1} ends, got {tuple(ends)}")
+    return stages[sum(step >= end for end in ends)]
 
 
 def masked_mean(values: Tensor, mask: Tensor) -> Tensor:

@@ -14,6 +14,7 @@ from typing import Literal
 
 from training.augmentation import AugmentationConfig
 from training.errors import TrainingError
+from training.losses import STAGE_WEIGHTS, STATIC_WEIGHTS, ScaleWeights
 from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
 
 Task = Literal["regressor", "regressor_f", "confnet", "gradnet"]
@@ -62,8 +63,10 @@ class RegressorPreset(Preset):
     """DispNetCorr1D from scratch."""
 
     network: DispNetConfig = field(default_factory=DispNetConfig)
-    stage_ends: tuple[int, ...] = (0, 0, 0, 0, 0, 0)
-    """Step at which each stage of the loss weights but the last ends."""
+    loss_stages: tuple[ScaleWeights, ...] = STAGE_WEIGHTS
+    """Weights of the six scales' losses, one row a stage."""
+    stage_ends: tuple[int, ...]
+    """Step at which each stage but the last ends."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,14 +138,14 @@ SMALL_REGRESSOR = RegressorPreset(
     optimizer=SMALL_OPTIMIZER,
     augmentation=SMALL_AUGMENTATION,
     network=DispNetConfig(width=0.25, one_sided=True, normalization="batch", prediction_scale=16.0),
-    stage_ends=(500, 1000, 2000, 3000, 5000, 8000),
+    loss_stages=(STATIC_WEIGHTS,),
+    stage_ends=(),
     validation_interval=500,
 )
 TINY_REGRESSOR = replace(
     SMALL_REGRESSOR,
     steps=800,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=40),
-    stage_ends=(30, 60, 120, 200, 300, 400),
     validation_interval=200,
     validation_samples=16,
 )

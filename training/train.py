@@ -17,6 +17,7 @@ import torch
 from pytorch_lightning.callbacks import ModelCheckpoint
 from pytorch_lightning.loggers import TensorBoardLogger
 
+from storage import write_text
 from training.callbacks import BestWeights, RunProgress
 from training.data import DEFAULT_CACHE_BYTES, StereoDataModule, open_sources
 from training.errors import TrainingError
@@ -38,7 +39,6 @@ from training.weights import (
     read_summary,
     save_weights,
 )
-from viewing import write_atomically
 
 CALIBRATION_BATCHES = 20
 
@@ -71,7 +71,7 @@ def train(
         resume: continue from the last checkpoint, as if never interrupted; starts anew where there is none.
         steps: length of the run, the preset's by default; all its schedules are scaled to it.
         workers: processes that prepare crops; results do not depend on their number.
-        device: `auto`, `cpu`, `cuda`, ...
+        device: `auto`, `cpu`, `cuda`, `cuda:1`, ...
         cache_bytes: memory for decoded frames.
 
     Returns:
@@ -102,7 +102,7 @@ def train(
         raise TrainingError(
             f"{out}: already holds a {task}; continue it with --resume or choose another folder"
         )
-    write_atomically(logs / "settings.json", json.dumps(settings, indent=2) + "\n")
+    write_text(logs / "settings.json", json.dumps(settings, indent=2) + "\n")
 
     sources, validation = open_sources(data, (preset.crop_height, preset.crop_width))
     module = StereoDataModule(sources, validation, preset, steps, seed, workers, cache_bytes)
@@ -190,7 +190,7 @@ def _last_checkpoint(path: Path) -> ModelCheckpoint:
 
 def _trainer(preset: Preset, steps: int, logs: Path, callbacks: list[pl.Callback], device: str) -> pl.Trainer:
     return pl.Trainer(
-        accelerator=device,
+        **_hardware(device),
         max_steps=steps,
         max_epochs=-1,
         reload_dataloaders_every_n_epochs=1,
@@ -203,6 +203,18 @@ def _trainer(preset: Preset, steps: int, logs: Path, callbacks: list[pl.Callback
         enable_progress_bar=False,
         enable_model_summary=False,
     )
+
+
+def _hardware(device: str) -> dict[str, Any]:
+    """Lightning's words for `auto`, `cpu`, `cuda`, `cuda:1`, ..."""
+    kind, _, index = device.partition(":")
+    try:
+        torch.device("cpu" if kind == "auto" else device)
+    except RuntimeError as error:
+        raise TrainingError(f"there is no device {device!r}; try auto, cpu, cuda or cuda:1") from error
+    if kind == "cuda" and not torch.cuda.is_available():
+        raise TrainingError(f"cannot train on {device}: torch finds no GPU here")
+    return {"accelerator": kind, "devices": [int(index)] if index and kind != "cpu" else 1}
 
 
 def _check_settings(path: Path, settings: dict[str, Any]) -> None:

@@ -18,9 +18,9 @@ import safetensors.torch
 from safetensors import SafetensorError
 from torch import nn
 
+from storage import write_bytes, write_text
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
-from viewing import write_atomically
 
 Network = TypeVar("Network", bound=nn.Module)
 FORMAT = 1
@@ -78,8 +78,8 @@ def save_weights(
         "network": asdict(network.config),
         "training": asdict(training),
     }
-    write_atomically(weights_path(run, task), content)
-    write_atomically(run / f"{task}.json", json.dumps(description, indent=2) + "\n")
+    write_bytes(weights_path(run, task), content)
+    write_text(run / f"{task}.json", json.dumps(description, indent=2) + "\n")
 
 
 def load_regressor(run: Path, task: str = "regressor") -> StoredNetwork[DispNetCorr1D]:
@@ -111,7 +111,7 @@ def copy_weights(source: Path, target: Path, task: str) -> None:
     """Copy a network, intact, from one run folder to another."""
     load_regressor(source, task)
     for path in (weights_path(source, task), source / f"{task}.json"):
-        write_atomically(target / path.name, path.read_bytes())
+        write_bytes(target / path.name, path.read_bytes())
 
 
 def has_weights(run: Path, task: str) -> bool:

@@ -4,7 +4,6 @@ Used by the gallery of `datagen`, the image panels of `training` and the report 
 them.
 """
 
-from viewing.files import write_atomically
 from viewing.html import data_uri, render_page
 from viewing.pictures import (
     Picture,
@@ -36,5 +35,4 @@ __all__ = [
     "shrunk",
     "side_by_side",
     "stacked",
-    "write_atomically",
 ]

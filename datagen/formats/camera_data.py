@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
-from datagen.formats.atomic import write_bytes
 from datagen.formats.limits import read_bounded
+from storage import write_bytes
 
 Matrix = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
-from datagen.formats.atomic import replacing
 from datagen.formats.limits import check_image_size, read_bounded
+from storage import replacing
 
 _CHANNELS = ("dx", "dy", "valid")
 _MAGIC_AND_VERSION = struct.pack("<II", 20000630, 2)

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
-from datagen.formats.atomic import write_bytes
 from datagen.formats.limits import check_image_size, read_bounded
+from storage import write_bytes
 
 _HEADER = re.compile(rb"(P[fF])\s{1,8}(\d{1,9})\s{1,8}(\d{1,9})\s{1,8}(\S{1,32})\s")
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
-from datagen.formats.atomic import write_bytes
 from datagen.formats.limits import check_image_size, read_bounded
+from storage import write_bytes
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COMPRESSION_LEVEL = 1

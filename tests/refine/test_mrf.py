@@ -108,6 +108,15 @@ def test_multigrid_needs_far_fewer_iterations_than_jacobi():
     assert multigrid * 4 < jacobi
 
 
+def test_multigrid_stays_fast_where_nothing_is_confident_and_all_is_textured():
+    problem = random_problem(120, 150, seed=14, style="noise")
+    confidence = np.where(problem.confidence > 0.99, 1.0, 0.0)
+    for form, limit in (("exact", 40), ("paper", 15)):
+        info = solve_mrf(problem.disparity, confidence, problem.gradient, problem.image, form=form).info
+        assert info.solver == "multigrid"
+        assert info.iterations < limit
+
+
 def test_auto_is_direct_on_small_images_and_multigrid_on_large_ones():
     assert solve_mrf(*random_problem(20, 20, 1).inputs).info.solver == "direct"
     assert solve_mrf(*random_problem(70, 70, 1).inputs).info.solver == "multigrid"

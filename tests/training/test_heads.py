@@ -45,7 +45,7 @@ def test_outputs_cover_every_pixel(half: bool) -> None:
     )
     confidence = ConfNet(config).eval().confidence(image, features, consistency)
     assert confidence.shape == (2, 1, 32, 64)
-    assert ((0 <= confidence) & (confidence <= 1)).all()
+    assert ((confidence >= 0) & (confidence <= 1)).all()
     assert GradNet(config)(image, features).shape == (2, 2, 32, 64)
 
 
@@ -58,7 +58,7 @@ def test_inputs_are_standardized_with_fixed_numbers() -> None:
     joined = network.joined_input(image, features)
     network.standardize(joined.mean((0, 2, 3)), joined.std((0, 2, 3)))
     seen: list[torch.Tensor] = []
-    network.layers[0].register_forward_hook(lambda module, inputs, output: seen.append(inputs[0]))
+    network.layers[0].register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]))
     network(image, features)
     network(image, features + 30)
     torch.testing.assert_close(seen[0].mean((0, 2, 3)), torch.zeros(5), atol=1e-5, rtol=0)

@@ -8,6 +8,7 @@ import torch
 
 from training.losses import (
     STAGE_WEIGHTS,
+    STATIC_WEIGHTS,
     confidence_cross_entropy,
     disparity_l1,
     downsample_disparity,
@@ -67,13 +68,11 @@ def test_stage_table_is_the_published_one() -> None:
 
 def test_stages_follow_their_ends() -> None:
     ends = (10, 20, 20, 30, 40, 50)
-    assert stage_weights(0, ends) == STAGE_WEIGHTS[0]
-    assert stage_weights(9, ends) == STAGE_WEIGHTS[0]
-    assert stage_weights(10, ends) == STAGE_WEIGHTS[1]
-    assert stage_weights(20, ends) == STAGE_WEIGHTS[3]
-    assert stage_weights(50, ends) == STAGE_WEIGHTS[6]
+    for step, stage in ((0, 0), (9, 0), (10, 1), (20, 3), (49, 5), (50, 6)):
+        assert stage_weights(step, STAGE_WEIGHTS, ends) == STAGE_WEIGHTS[stage]
+    assert stage_weights(7, (STATIC_WEIGHTS,), ()) == STATIC_WEIGHTS
     with pytest.raises(ValueError, match="6 ends"):
-        stage_weights(0, (1, 2))
+        stage_weights(0, STAGE_WEIGHTS, (1, 2))
 
 
 def test_equation_9(rng: np.random.Generator) -> None:

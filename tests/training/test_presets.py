@@ -6,6 +6,7 @@ from dataclasses import fields, is_dataclass
 import pytest
 import torch
 
+from training.losses import STAGE_WEIGHTS
 from training.metrics import bad_rate, gradient_error, optimal_auc, sparsification_auc
 from training.networks import DispNetConfig, DispNetCorr1D, HeadConfig
 from training.presets import (
@@ -30,6 +31,7 @@ def test_full_regressor() -> None:
     assert (optimizer.learning_rate, optimizer.betas, optimizer.epsilon) == (1e-4, (0.9, 0.999), 1e-4)
     assert optimizer.halve_at == (200_000, 350_000, 500_000, 650_000, 800_000)
     assert (optimizer.weight_decay, optimizer.clip_norm, optimizer.warmup_steps) == (4e-4, None, 0)
+    assert preset.loss_stages == STAGE_WEIGHTS
     augmentation = preset.augmentation
     assert (augmentation.translation, augmentation.log_zoom, augmentation.log_squeeze) == (
         0.4,
@@ -75,7 +77,8 @@ def test_presets_are_coherent(task: str, name: str) -> None:
             hash(value)
     if isinstance(preset, RegressorPreset):
         assert list(preset.stage_ends) == sorted(preset.stage_ends)
-        assert preset.stage_ends[-1] <= preset.steps
+        assert len(preset.stage_ends) == len(preset.loss_stages) - 1
+        assert all(end <= preset.steps for end in preset.stage_ends)
 
 
 def test_decay_reaches_the_contracting_weights_only() -> None:

@@ -67,21 +67,24 @@ def scalars(run: Path, task: str, name: str) -> dict[int, float]:
 
 @pytest.mark.slow
 def test_overfits_four_samples(data: Path, tmp_path: Path) -> None:
-    """The regressor, then both heads on it, learn four pairs nearly by heart."""
-    regressor = replace(
-        quick_regressor(augmentation=NO_AUGMENTATION), network=DispNetConfig(0.125, 10, True, "batch", 16.0)
+    """The regressor, then both heads on it, learn four pairs (mean disparity about 10 px) nearly by heart."""
+    network = DispNetConfig(0.125, 10, one_sided=True, normalization="batch", prediction_scale=16.0)
+    alike = {"augmentation": NO_AUGMENTATION, "validation_interval": 300}
+    presets = {task: quick(task, **alike) for task in ("regressor", "confnet", "gradnet")}
+    presets["regressor"] = replace(
+        quick_regressor(**alike),
+        network=network,
+        optimizer=replace(presets["regressor"].optimizer, learning_rate=3e-3, weight_decay=0.0),
     )
-    steps = {"regressor": 500, "confnet": 150, "gradnet": 150}
-    presets = {task: quick(task, augmentation=NO_AUGMENTATION) for task in ("confnet", "gradnet")}
     final = {}
-    for task, preset in ({"regressor": regressor} | presets).items():
-        preset = replace(preset, validation_interval=500)
-        train(task, [(data, 1.0)], tmp_path, preset, steps=steps[task], progress=False)
+    for task, steps in {"regressor": 300, "confnet": 100, "gradnet": 100}.items():
+        train(task, [(data, 1.0)], tmp_path, presets[task], steps=steps, progress=False)
         losses = scalars(tmp_path, task, "train/loss")
-        final[task] = losses[max(losses)], losses[min(losses)]
-    assert final["regressor"][0] < 0.6, final
-    assert final["confnet"][0] < 0.3, final
-    assert final["gradnet"][0] < 0.03, final
+        final[task] = losses[max(losses)]
+    # The regressor's is the sum over its scales, 0.2 of each coarse one.
+    assert final["regressor"] < 1.5
+    assert final["confnet"] < 0.3
+    assert final["gradnet"] < 0.04
 
 
 @pytest.mark.parametrize("task", ["regressor", "regressor_f", "confnet", "gradnet"])
@@ -208,6 +211,8 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
         train("regressor", source, run, quick_regressor(), steps=6, progress=False)
     with pytest.raises(TrainingError, match="started with another steps"):
         train("regressor", source, run, quick_regressor(), steps=7, resume=True, progress=False)
+    with pytest.raises(TrainingError, match="no device 'abacus'"):
+        train("regressor", source, tmp_path / "device", quick_regressor(), device="abacus")
     with pytest.raises(TrainingError, match="frames of 128x64 are smaller"):
         train("regressor", source, tmp_path / "crop", "tiny")
     with pytest.raises(DatasetError, match="no such folder"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import os
 import re
 from html.parser import HTMLParser
 from xml.etree import ElementTree
@@ -13,7 +12,7 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 
-from viewing import data_uri, write_atomically
+from viewing import data_uri
 from viewing.html import environment
 from viewing.plots import curves, histogram, pixels, svg
 
@@ -132,28 +131,3 @@ def test_histograms_draw_every_series():
     picture = pixels(histogram([0, 1, 2], {"train": [1, 3], "test": [2, 2]}, "disparity, px", "share"))
     assert picture.dtype == np.uint8
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 10
-
-
-def test_an_atomic_write_replaces_and_is_readable_by_others(tmp_path):
-    target = tmp_path / "new" / "file.txt"
-    write_atomically(target, "first ünd")
-    write_atomically(target, b"second")
-    assert target.read_bytes() == b"second"
-    assert [path.name for path in target.parent.iterdir()] == ["file.txt"]
-    reference = tmp_path / "plain.txt"
-    reference.write_text("x")
-    assert target.stat().st_mode == reference.stat().st_mode
-
-
-def test_an_interrupted_write_leaves_the_old_file_alone(tmp_path, monkeypatch):
-    target = tmp_path / "file.txt"
-    write_atomically(target, "old")
-
-    def fail(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(os, "replace", fail)
-    with pytest.raises(KeyboardInterrupt):
-        write_atomically(target, "new")
-    assert target.read_text() == "old"
-    assert [path.name for path in tmp_path.iterdir()] == ["file.txt"]

@@ -100,6 +100,7 @@ class StereoTask(pl.LightningModule):
             lr=config.learning_rate,
             betas=config.betas,
             eps=config.epsilon,
+            fused=True,
         )
         scheduler = torch.optim.lr_scheduler.LambdaLR(
             optimizer, lambda step: learning_rate_factor(config, step, self.steps, self.preset.steps)

@@ -52,18 +52,18 @@ class _DisparityTask(StereoTask):
 
 
 class RegressorTask(_DisparityTask):
-    """Multi-scale L1 whose weights move from coarse to fine (Mayer et al. 2016)."""
+    """Multi-scale L1 (Mayer et al. 2016)."""
 
     def __init__(self, preset: RegressorPreset, network: DispNetCorr1D, steps: int, seed: int) -> None:
         super().__init__(preset, steps, seed)
         self.network = network
+        self.stages = preset.loss_stages
         self.stage_ends = [round(end * steps / preset.steps) for end in preset.stage_ends]
 
     def loss(self, batch: Batch) -> Tensor:
         predictions = self.network(batch["left"], batch["right"]).disparities
-        return multiscale_l1(
-            predictions, batch["disparity"], stage_weights(self.global_step, self.stage_ends)
-        )
+        weights = stage_weights(self.global_step, self.stages, self.stage_ends)
+        return multiscale_l1(predictions, batch["disparity"], weights)
 
 
 class FineTuningTask(_DisparityTask):

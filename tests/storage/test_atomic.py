@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from datagen.formats import read_pfm, write_pfm
-from datagen.formats.atomic import TEMPORARY_SUFFIX, replacing, write_text
+from storage import TEMPORARY_SUFFIX, replacing, write_text
 
 
 def write_half(path: Path) -> None:
@@ -28,6 +28,12 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> 
         write_half(path)
     assert [item.name for item in tmp_path.iterdir()] == ["a.txt"]
     assert path.read_text() == "old"
+
+
+def test_a_new_file_has_the_rights_of_any_other(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "x")
+    (tmp_path / "plain.txt").write_text("x")
+    assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "plain.txt").stat().st_mode
 
 
 def test_text_is_utf8_with_unix_lines_and_folders_are_made(tmp_path: Path) -> None:
