@@ -17,11 +17,12 @@ from cattrs.gen import make_dict_structure_fn
 from cattrs.strategies import configure_tagged_union
 from cattrs.v import format_exception
 
+import scenes.deformations
 import scenes.shapes
 import scenes.textures
 from scenes.family import FamilyConfig
 from scenes.registry import FAMILIES
-from scenes.spec import Light, Scene, Shape, Texture
+from scenes.spec import Deformation, Light, Scene, Shape, Texture
 
 T = TypeVar("T")
 
@@ -53,6 +54,7 @@ def _make_converter() -> Converter:
     )
     _tagged(converter, Shape, scenes.shapes.SHAPES)
     _tagged(converter, Texture, scenes.textures.TEXTURES)
+    _tagged(converter, Deformation, scenes.deformations.DEFORMATIONS)
     _tagged(converter, FamilyConfig, {name: kind.config for name, kind in FAMILIES.items()}, tag="family")
     configure_tagged_union(Light, converter, tag_name="kind")
     return converter

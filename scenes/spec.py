@@ -69,6 +69,18 @@ class Texture(ABC):
 
 
 @dataclass(frozen=True)
+class Deformation(ABC):
+    """A non-rigid motion of one mesh; subclasses in `scenes.deformations` each know one way to bend it."""
+
+    @abstractmethod
+    def deformed(self, vertices: NDArray[np.float64], time_frames: float) -> NDArray[np.float64]:
+        """Where the vertices (V, 3) of the shape's mesh are at an instant, in mesh coordinates.
+
+        A pure function, smooth in time: vertex k stays the same point of the surface throughout.
+        """
+
+
+@dataclass(frozen=True)
 class Material:
     """How a surface answers light: one base-colour texture and the scalars of a principled BSDF."""
 
@@ -139,6 +151,8 @@ class SceneObject:
     motion: Trajectory
     scale_m: Vector = (1.0, 1.0, 1.0)
     """Half extents: the shape's cube [-1, 1]^3 becomes a box of twice this size."""
+    deformation: Deformation | None = None
+    """How the mesh bends over time, before it is scaled and moved; None for a rigid thing."""
 
     def pose(self, time_frames: float) -> NDArray[np.float64]:
         """The (4, 4) matrix from mesh coordinates to the world, scale included."""
@@ -214,6 +228,35 @@ class World:
 
 
 @dataclass(frozen=True)
+class Fog:
+    """Homogeneous haze: over a distance of `visibility_m` the share 1/e of a surface's light is left."""
+
+    color: Color
+    visibility_m: float
+
+
+@dataclass(frozen=True)
+class FinalPass:
+    """What the final pass adds to the clean one. Ground truth is the same for both."""
+
+    shutter_frames: float = 0.5
+    """Motion blur: how long the shutter is open, centred on the frame's instant; 0 for none."""
+    f_number: float = 0.0
+    """Defocus: focal length over aperture; 0 for a pinhole."""
+    focus_m: float = 10.0
+    """Distance of sharpest focus along the optical axis."""
+    fog: Fog | None = None
+    noise: float = 0.0
+    """Standard deviation of sensor noise at full white, 0..1; photon noise, so it grows with the root of light."""
+    vignetting: float = 0.0
+    """Share of the light lost in the corners, 0..1."""
+    exposure_difference_ev: float = 0.0
+    """The right eye's exposure against the left's, in stops."""
+    right_eye_color: Color = (1.0, 1.0, 1.0)
+    """The right eye's colour balance against the left's, gain an RGB channel."""
+
+
+@dataclass(frozen=True)
 class Scene:
     """A world, the rig that looks at it, and how many frames it is watched for."""
 
@@ -226,6 +269,7 @@ class Scene:
     world: World
     exposure_key: float = 0.18
     """The image's mean reflectance-like level after automatic exposure, linear, 0..1 (0.18 is middle grey)."""
+    final: FinalPass = field(default_factory=FinalPass)
     notes: dict[str, float] = field(default_factory=dict)
     """Numbers the sampler wants kept beside the scene (not used for rendering)."""
 

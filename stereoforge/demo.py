@@ -26,8 +26,10 @@ NETWORKS = ("regressor", "confnet", "gradnet")
 class DemoPlan:
     """How much of everything; the defaults fill a quarter of an hour on two cores, installing included."""
 
-    world: FlyingThingsConfig = FlyingThingsConfig(
-        width=384, height=192, frames=4, background_objects=(60, 90)
+    world: FlyingThingsConfig = field(
+        default_factory=lambda: FlyingThingsConfig(
+            width=384, height=192, frames=4, background_objects=(60, 90)
+        )
     )
     scenes: dict[str, int] = field(default_factory=lambda: {"train": 48, "val": 4, "test": 6})
     steps: dict[str, int] = field(default_factory=lambda: {"regressor": 800, "confnet": 150, "gradnet": 150})

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from scenes import FAMILIES, FamilyConfig, sample_scene, scene_from_json, scene_to_json
+from scenes.deformations.sway import Sway
 from scenes.families.flying_things import FlyingThingsConfig
 from scenes.serialization import from_plain, to_plain
-from scenes.spec import Scene
+from scenes.spec import FinalPass, Fog, Scene
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +65,10 @@ def test_unknown_families_and_foreign_configs_are_refused() -> None:
         sample_scene(rng, "flying_cars")
     with pytest.raises(ValueError, match="takes a FlyingThingsConfig"):
         sample_scene(rng, "flying_things", FamilyConfig())
+
+
+def test_deformations_and_the_final_pass_survive(scene: Scene) -> None:
+    bent = dataclasses.replace(scene.objects[0], deformation=Sway(0.2, 30.0, 12.0))
+    final = FinalPass(fog=Fog((0.5, 0.6, 0.7), 40.0), f_number=2.8)
+    changed = dataclasses.replace(scene, objects=(bent, *scene.objects[1:]), final=final)
+    assert scene_from_json(scene_to_json(changed)) == changed
