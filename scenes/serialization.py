@@ -84,7 +84,11 @@ def from_plain(data: Any, kind: type[T]) -> T:
 
 def _describe(error: BaseException, kind: type | None) -> str:
     """What is wrong with one field: our records' own words where they have some, else cattrs'."""
-    return str(error) if type(error) is ValueError else format_exception(error, kind)
+    own_words = type(error) is ValueError or type(error).__module__.split(".")[0] not in (
+        "builtins",
+        "cattrs",
+    )
+    return str(error) if own_words else format_exception(error, kind)
 
 
 def scene_to_json(scene: Scene) -> str:

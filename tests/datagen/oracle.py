@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+NEAR_M = 1e-6
 
 
 @njit(cache=True)
@@ -17,43 +21,53 @@ def cast_depth(
     """
     depth = np.full((height, width), np.inf)
     for k in range(triangles.shape[0]):
-        a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
-        normal = np.cross(b - a, c - a)
-        offset = normal[0] * a[0] + normal[1] * a[1] + normal[2] * a[2]
-        first_row, last_row, first_column, last_column = 0, height - 1, 0, width - 1
-        if a[2] < -1e-6 and b[2] < -1e-6 and c[2] < -1e-6:
-            u = np.array([-a[0] / a[2], -b[0] / b[2], -c[0] / c[2]]) * focal_px + width / 2
-            v = np.array([a[1] / a[2], b[1] / b[2], c[1] / c[2]]) * focal_px + height / 2
-            first_column = max(0, int(np.floor(u.min())) - 1)
-            last_column = min(width - 1, int(np.ceil(u.max())) + 1)
-            first_row = max(0, int(np.floor(v.min())) - 1)
-            last_row = min(height - 1, int(np.ceil(v.max())) + 1)
-        for i in range(first_row, last_row + 1):
+        t = triangles[k]
+        if t[0, 2] >= -NEAR_M and t[1, 2] >= -NEAR_M and t[2, 2] >= -NEAR_M:
+            continue
+        rows, columns = _window(t, width, height, focal_px)
+        e1x, e1y, e1z = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
+        e2x, e2y, e2z = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
+        nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
+        offset = nx * t[0, 0] + ny * t[0, 1] + nz * t[0, 2]
+        for i in range(rows[0], rows[1] + 1):
             y = -(i + 0.5 - height / 2) / focal_px
-            for j in range(first_column, last_column + 1):
+            for j in range(columns[0], columns[1] + 1):
                 x = (j + 0.5 + shift_px - width / 2) / focal_px
-                slope = normal[0] * x + normal[1] * y - normal[2]
+                slope = nx * x + ny * y - nz
                 if slope == 0.0:
                     continue
                 z = offset / slope
-                if z <= 0.0 or z >= depth[i, j]:
-                    continue
-                point = np.array([x * z, y * z, -z])
-                if (
-                    _inside(normal, a, b, point)
-                    and _inside(normal, b, c, point)
-                    and _inside(normal, c, a, point)
-                ):
+                if 0.0 < z < depth[i, j] and _inside(t, nx, ny, nz, x * z, y * z, -z):
                     depth[i, j] = z
     return depth
 
 
 @njit(cache=True)
-def _inside(
-    normal: NDArray[np.float64],
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
-    point: NDArray[np.float64],
-) -> bool:
-    side = np.cross(end - start, point - start)
-    return normal[0] * side[0] + normal[1] * side[1] + normal[2] * side[2] >= 0.0
+def _window(
+    t: NDArray[np.float64], width: int, height: int, focal_px: float
+) -> tuple[tuple[int, int], tuple[int, int]]:
+    """First and last row and column that a triangle can cover: all of them if it crosses the eye's plane."""
+    if t[0, 2] > -NEAR_M or t[1, 2] > -NEAR_M or t[2, 2] > -NEAR_M:
+        return (0, height - 1), (0, width - 1)
+    low_u, high_u, low_v, high_v = math.inf, -math.inf, math.inf, -math.inf
+    for k in range(3):
+        u, v = -t[k, 0] / t[k, 2] * focal_px + width / 2, t[k, 1] / t[k, 2] * focal_px + height / 2
+        low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, v), max(high_v, v)
+    first_row, last_row = max(0.0, low_v - 2), min(height - 1.0, high_v + 2)
+    first_column, last_column = max(0.0, low_u - 2), min(width - 1.0, high_u + 2)
+    if first_row > last_row or first_column > last_column:
+        return (0, -1), (0, -1)
+    return (int(first_row), int(last_row)), (int(first_column), int(last_column))
+
+
+@njit(cache=True)
+def _inside(t: NDArray[np.float64], nx: float, ny: float, nz: float, px: float, py: float, pz: float) -> bool:
+    """Whether a point of the triangle's plane is on the inner side of all three edges."""
+    for k in range(3):
+        m = (k + 1) % 3
+        ex, ey, ez = t[m, 0] - t[k, 0], t[m, 1] - t[k, 1], t[m, 2] - t[k, 2]
+        qx, qy, qz = px - t[k, 0], py - t[k, 1], pz - t[k, 2]
+        side = nx * (ey * qz - ez * qy) + ny * (ez * qx - ex * qz) + nz * (ex * qy - ey * qx)
+        if side < 0.0:
+            return False
+    return True

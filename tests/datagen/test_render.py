@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -77,20 +78,29 @@ def test_killed_run_continues_to_the_same_bytes(reference: Path, tmp_path: Path)
     assert hashes(root) == hashes(reference)
 
 
-def test_a_finished_set_renders_nothing_and_can_grow(reference: Path) -> None:
-    assert render_dataset(RECIPE, reference).rendered == 0
-    before = hashes(reference)
-    summary = render_dataset(replace(RECIPE, scenes={"val": 1}), reference, workers=1)
+def test_a_finished_set_renders_nothing_and_can_grow(reference: Path, tmp_path: Path) -> None:
+    root = tmp_path / "set"
+    shutil.copytree(reference, root)
+    assert render_dataset(RECIPE, root).rendered == 0
+    before = hashes(root)
+    summary = render_dataset(replace(RECIPE, scenes={"val": 1}), root, workers=1)
     assert summary.rendered == 1
-    assert read_recipe(reference / "recipe.yaml").scenes == {"train": 3, "val": 1, "test": 2}
-    after = hashes(reference)
+    assert read_recipe(root / "recipe.yaml").scenes == {"train": 3, "val": 1, "test": 2}
     del before["recipe.yaml"]
-    assert before.items() <= after.items()
-    # Leave the shared folder as the other tests expect it.
-    for path in [path for path in reference.rglob("*") if "VAL" in path.parts and path.is_file()]:
-        path.unlink()
-    (reference / "recipe.yaml").unlink()
-    render_dataset(RECIPE, reference)
+    assert before.items() <= hashes(root).items()
+
+
+def test_a_process_in_which_blender_runs_can_still_spawn_workers(tmp_path: Path) -> None:
+    code = (
+        "from tests.datagen.test_render import RECIPE, replace, render_dataset\n"
+        "if __name__ == '__main__':\n    import bpy\n"
+        f"    summary = render_dataset(replace(RECIPE, scenes={{'test': 1}}), {str(tmp_path / 'set')!r}, workers=1)\n"
+        "    assert summary.rendered == 1, summary\n"
+    )
+    (tmp_path / "run.py").write_text(code)
+    environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
+    done = subprocess.run([sys.executable, str(tmp_path / "run.py")], env=environment, capture_output=True)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.slow
