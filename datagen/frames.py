@@ -21,6 +21,7 @@ from datagen.ground_truth import (
     to_camera_frame,
 )
 from datagen.layout import EYES, Eye
+from datagen.scene_geometry import SceneGeometry
 from scenes import Scene
 
 BLENDER_LOG = "blender.log"
@@ -96,7 +97,7 @@ def render_frames(
     try:
         with watch.step("build"), quiet(log):
             settings = CyclesSettings(options.samples, options.device, options.threads)
-            world = build_world(scene, start_empty_file(settings))
+            world = build_world(SceneGeometry(scene), start_empty_file(settings))
         for frame in range(scene.frames):
             with watch.step("render"), quiet(log):
                 views = {eye: render_view(world, eye, frame, scratch) for eye in EYES}

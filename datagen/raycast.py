@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE, RectifiedPair
 from datagen.layout import Eye
-from scenes import Scene
+from datagen.scene_geometry import SceneGeometry
 
 _FAR = 1e30
 
@@ -34,16 +34,9 @@ class SceneRayCaster:
     Meshes are built once; they stand in the left eye's frame, where 32 bits lose least.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._meshes = [thing.shape.mesh() for thing in scene.objects]
-        first_vertex = np.cumsum([0, *(len(mesh.vertices) for mesh in self._meshes)])
-        self._triangles = np.concatenate(
-            [np.zeros((0, 3), np.int32)]
-            + [mesh.triangles + first for mesh, first in zip(self._meshes, first_vertex, strict=False)]
-        ).astype(np.int32)
-        """(T, 3) indices into the vertices of all meshes."""
-        self._owners = np.repeat(np.arange(len(self._meshes)), [len(mesh.triangles) for mesh in self._meshes])
+    def __init__(self, geometry: SceneGeometry) -> None:
+        self._geometry = geometry
+        self._scene = geometry.scene
         self._instant: float | None = None
 
     def cast(self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Hits:
@@ -56,7 +49,7 @@ class SceneRayCaster:
         directions = pair.rays()[rows, columns]
         disparity, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
         hidden = np.zeros(len(directions), bool)
-        if len(self._triangles):
+        if len(self._geometry.triangles):
             if time_frames != self._instant:
                 self._place(time_frames)
             eyes = np.array([0.0, 0.0, 0.0]), np.array([camera.baseline_m, 0.0, 0.0])
@@ -73,14 +66,14 @@ class SceneRayCaster:
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         hit = self._run(origin, directions, "INTERSECT", np.full(len(directions), _FAR))
         met = hit >= 0
-        corners = self._vertices[self._triangles[hit[met]]] - origin
+        corners = self._vertices[self._geometry.triangles[hit[met]]] - origin
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # depth = n.v / n.r with a ray r of unit length along the axis, and disparity = fB / depth.
         along = np.einsum("ij,ij->i", normals, directions[met])
         disparity, index = np.zeros(len(hit)), np.zeros(len(hit), np.int64)
         distance = np.einsum("ij,ij->i", normals, corners[:, 0])
         disparity[met] = self._scene.camera.disparity_metres * along / distance
-        index[met] = 1 + self._owners[hit[met]]
+        index[met] = 1 + self._geometry.owners[hit[met]]
         return disparity, index
 
     def _hidden(
@@ -114,12 +107,7 @@ class SceneRayCaster:
     def _place(self, time_frames: float) -> None:
         """Put all triangles where they are at an instant."""
         to_left_eye = np.linalg.inv(self._scene.camera.pose("left", time_frames))
-        poses = [to_left_eye @ thing.pose(time_frames) for thing in self._scene.objects]
-        moved = [
-            mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
-            for mesh, pose in zip(self._meshes, poses, strict=True)
-        ]
-        self._vertices = np.concatenate(moved)
+        self._vertices = self._geometry.vertices(time_frames, to_left_eye)
         self._embree = EmbreeScene(robust=True)
-        TriangleMesh(self._embree, self._vertices.astype(np.float32), self._triangles)
+        TriangleMesh(self._embree, self._vertices.astype(np.float32), self._geometry.triangles)
         self._instant = time_frames

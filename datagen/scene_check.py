@@ -16,6 +16,7 @@ from datagen.layout import EYES, FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, Lay
 from datagen.manifest import FileEntry, SceneManifest, read_manifest
 from datagen.raycast import SceneRayCaster
 from datagen.recipe import Recipe
+from datagen.scene_geometry import SceneGeometry
 from scenes import Scene
 
 SAMPLED_PIXELS = 500
@@ -74,7 +75,8 @@ class SceneCheck:
             except DatasetError as error:
                 self._failed(error)
             else:
-                self._check_contents(scene, SceneRayCaster(scene) if self.sampled_pixels else None)
+                caster = SceneRayCaster(SceneGeometry(scene)) if self.sampled_pixels else None
+                self._check_contents(scene, caster)
         return self
 
     def _found(self, path: Path, message: str) -> None:

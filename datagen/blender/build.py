@@ -8,9 +8,12 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
+from numpy.typing import NDArray
 
 from datagen.blender.materials import build_material, image_from_array
-from scenes.spec import AreaLight, Light, Scene, SceneObject, StereoCamera, SunLight, World
+from datagen.scene_geometry import SceneGeometry
+from scenes.mesh import Mesh
+from scenes.spec import AreaLight, Light, Scene, StereoCamera, SunLight, World
 
 
 @dataclass(frozen=True)
@@ -18,6 +21,7 @@ class BuiltWorld:
     """A Scene standing in the open Blender file."""
 
     scene: Scene
+    geometry: SceneGeometry
     blender_scene: bpy.types.Scene
     camera: bpy.types.Object
     """One camera, moved from eye to eye."""
@@ -25,48 +29,54 @@ class BuiltWorld:
     """In the order of `Scene.objects`."""
 
 
-def build_world(scene: Scene, blender_scene: bpy.types.Scene) -> BuiltWorld:
-    """Build everything in `scene` into an empty Blender file."""
+def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> BuiltWorld:
+    """Build everything in the geometry's scene into an empty Blender file."""
+    scene = geometry.scene
     materials = [build_material(f"material_{k}", item) for k, item in enumerate(scene.materials)]
-    objects = tuple(
-        _build_object(index, thing, scene, materials, blender_scene)
-        for index, thing in enumerate(scene.objects)
-    )
+    objects = _build_objects(geometry, materials, blender_scene)
     for index, light in enumerate(scene.lights):
         _build_light(index, light, blender_scene)
     _build_environment(scene.world, blender_scene)
     camera = _build_camera(scene.camera, blender_scene)
-    return BuiltWorld(scene, blender_scene, camera, objects)
+    return BuiltWorld(scene, geometry, blender_scene, camera, objects)
 
 
 def place(world: BuiltWorld, eye: str, time_frames: float) -> None:
-    """Put every object, and the camera for one eye, where they are at an instant."""
-    for thing, block in zip(world.scene.objects, world.objects, strict=True):
+    """Put every object, and the camera for one eye, where they are at an instant, deformed as they are then."""
+    for index, (thing, block) in enumerate(zip(world.scene.objects, world.objects, strict=True)):
         if len(thing.motion.times_frames) > 1:
             block.matrix_world = Matrix(thing.pose(time_frames).tolist())
+        if thing.deformation is not None:
+            _move_vertices(block.data, world.geometry.local_vertices(index, time_frames))
     world.camera.matrix_world = Matrix(world.scene.camera.pose(eye, time_frames).tolist())
     bpy.context.view_layer.update()
 
 
-def _build_object(
-    index: int,
-    thing: SceneObject,
-    scene: Scene,
-    materials: Sequence[bpy.types.Material],
-    blender_scene: bpy.types.Scene,
-) -> bpy.types.Object:
-    mesh = bpy.data.meshes.new(thing.name)
-    _fill_mesh(mesh, thing, scene.materials[thing.material].repeats)
-    mesh.materials.append(materials[thing.material])
-    block = bpy.data.objects.new(thing.name, mesh)
-    block.pass_index = index + 1
-    blender_scene.collection.objects.link(block)
-    block.matrix_world = Matrix(thing.pose(0.0).tolist())
-    return block
+def _build_objects(
+    geometry: SceneGeometry, materials: Sequence[bpy.types.Material], blender_scene: bpy.types.Scene
+) -> tuple[bpy.types.Object, ...]:
+    """One Blender object each; rigid ones of the same shape and material are instances of one mesh."""
+    shared: dict[tuple[int, int], bpy.types.Mesh] = {}
+    objects = []
+    for index, thing in enumerate(geometry.scene.objects):
+        data = geometry.meshes[index]
+        key = (id(data), thing.material)
+        mesh = shared.get(key) if thing.deformation is None else None
+        if mesh is None:
+            mesh = _build_mesh(thing.name, data, geometry.scene.materials[thing.material].repeats)
+            mesh.materials.append(materials[thing.material])
+            if thing.deformation is None:
+                shared[key] = mesh
+        block = bpy.data.objects.new(thing.name, mesh)
+        block.pass_index = index + 1
+        blender_scene.collection.objects.link(block)
+        block.matrix_world = Matrix(thing.pose(0.0).tolist())
+        objects.append(block)
+    return tuple(objects)
 
 
-def _fill_mesh(mesh: bpy.types.Mesh, thing: SceneObject, repeats: float) -> None:
-    data = thing.shape.mesh()
+def _build_mesh(name: str, data: Mesh, repeats: float) -> bpy.types.Mesh:
+    mesh = bpy.data.meshes.new(name)
     count = len(data.triangles)
     mesh.vertices.add(len(data.vertices))
     mesh.vertices.foreach_set("co", data.vertices.astype(np.float32).ravel())
@@ -78,6 +88,12 @@ def _fill_mesh(mesh: bpy.types.Mesh, thing: SceneObject, repeats: float) -> None
     layer = mesh.uv_layers.new(name="uv")
     layer.uv.foreach_set("vector", (data.corner_uv * np.float32(repeats)).astype(np.float32).ravel())
     mesh.update(calc_edges=True)
+    return mesh
+
+
+def _move_vertices(mesh: bpy.types.Mesh, vertices: NDArray[np.float64]) -> None:
+    mesh.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
+    mesh.update()  # Blender's normals and Cycles' persistent copy follow only when told.
 
 
 def _build_light(index: int, light: Light, blender_scene: bpy.types.Scene) -> None:
