@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import tyro
 
@@ -22,13 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; always ends in SystemExit: 0 success, 1 failure, 2 wrong usage, 130 interrupted."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = DEBUG_FLAG in words
-    command = tyro.extras.subcommand_cli_from_dict(
-        COMMANDS,
-        prog="stereoforge",
-        description="Make stereo training sets in Blender, train stereo networks on them, refine disparity.",
-        args=[word for word in words if word != DEBUG_FLAG],
-        config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff),
-    )
+    command = _parse([word for word in words if word != DEBUG_FLAG])
     try:
         command.run()
     except KeyboardInterrupt:
@@ -38,6 +35,42 @@ def main(arguments: Sequence[str] | None = None) -> None:
             raise
         sys.exit(_say(*_explain(error)))
     sys.exit(0)
+
+
+def _parse(words: Sequence[str]) -> Any:
+    """The command the words ask for; SystemExit 2 with one sentence if they ask for none, 0 after --help."""
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="stereoforge",
+                description="Make stereo training sets in Blender, train stereo networks on them, refine disparity.",
+                args=words,
+                config=(
+                    tyro.conf.OmitArgPrefixes,
+                    tyro.conf.FlagCreatePairsOff,
+                    tyro.conf.HelptextFromCommentsOff,
+                ),
+            )
+    except SystemExit as end:
+        if end.code == 2:
+            _say(_one_sentence(complaint.getvalue()), 2)
+        raise
+
+
+def _one_sentence(complaint: str) -> str:
+    """What a box of tyro's says: its first part, the first suggestion of a later part, where to read more."""
+    lines = [line.strip("│ ") for line in complaint.splitlines() if not line.startswith(("╭", "╰"))]
+    parts = [[word for word in part.split() if word.strip("─")] for part in "\n".join(lines).split("─" * 10)]
+    sentence = " ".join(parts[0]).split(" Got errors:")[0]
+    for part in parts[1:]:
+        text = " ".join(part)
+        if text.startswith("Perhaps you meant:"):
+            sentence += f" (perhaps you meant {part[3]}?)"
+        elif text.startswith("Available subcommands:"):
+            sentence += f" ({text[0].lower()}{text[1:]})"
+    return sentence
 
 
 def _explain(error: Exception) -> tuple[str, int]:

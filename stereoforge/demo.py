@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,10 +16,9 @@ from refine.evaluation import Evaluation
 from scenes.families.flying_things import FlyingThingsConfig
 from stereoforge.errors import CommandError
 from stereoforge.evaluation import evaluate_datasets, report_evaluation
-from stereoforge.progress import progress_bar
+from stereoforge.progress import console, progress_bar
 from training.predict import StereoPredictor
 from training.train import train
-from training.weights import has_weights
 
 NETWORKS = ("regressor", "confnet", "gradnet")
 
@@ -31,8 +32,8 @@ class DemoPlan:
             width=384, height=192, frames=4, background_objects=(60, 90)
         )
     )
-    scenes: dict[str, int] = field(default_factory=lambda: {"train": 48, "val": 4, "test": 6})
-    steps: dict[str, int] = field(default_factory=lambda: {"regressor": 800, "confnet": 150, "gradnet": 150})
+    scenes: dict[str, int] = field(default_factory=lambda: {"train": 36, "val": 4, "test": 5})
+    steps: dict[str, int] = field(default_factory=lambda: {"regressor": 1600, "confnet": 200, "gradnet": 200})
     """Training steps of each network's `tiny` preset."""
     gallery_scenes: int = 16
 
@@ -54,19 +55,31 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
     plan = plan or DemoPlan()
     started = time.monotonic()
     data, weights = out / "data", out / "weights"
-    _render(plan, data)
+    with _stage(f"rendering {sum(plan.scenes.values()) * plan.world.frames} stereo pairs"):
+        _render(plan, data)
     gallery = out / "gallery.html"
-    write_gallery(data, gallery, scenes=plan.gallery_scenes)
+    with _stage("making the gallery"):
+        write_gallery(data, gallery, scenes=plan.gallery_scenes)
     for network in NETWORKS:
-        if not _trained(weights, network):
+        with _stage(f"training the {network}, {plan.steps[network]} steps"):
             train(network, [(data, 1.0)], weights, "tiny", steps=plan.steps[network], resume=True)
     test = StereoDataset(data, "test")
-    evaluation = evaluate_datasets([test], StereoPredictor(weights))
+    with _stage(f"refining and evaluating {len(test)} test pairs"):
+        evaluation = evaluate_datasets([test], StereoPredictor(weights))
     minutes = (time.monotonic() - started) / 60
     files = report_evaluation(
         evaluation, [test], weights, out / "report", _limits(plan, minutes), "StereoForge demo"
     )
     return DemoResult(data, weights, gallery, files.html, evaluation, minutes)
+
+
+@contextmanager
+def _stage(title: str) -> Iterator[None]:
+    """Say what is being done, and how long it took."""
+    started = time.monotonic()
+    console.print(f"{title} ...")
+    yield
+    console.print(f"    {time.monotonic() - started:.0f} s")
 
 
 def _render(plan: DemoPlan, data: Path) -> None:
@@ -80,10 +93,6 @@ def _render(plan: DemoPlan, data: Path) -> None:
     if summary.failures:
         scene, reason = summary.failures[0]
         raise CommandError(f"{len(summary.failures)} scenes could not be rendered, {scene} because {reason}")
-
-
-def _trained(weights: Path, network: str) -> bool:
-    return has_weights(weights, network) and not (weights / "logs" / network / "last.ckpt").exists()
 
 
 def _limits(plan: DemoPlan, minutes: float) -> tuple[str, ...]:

@@ -1,0 +1,205 @@
+"""The command line as a user meets it: help, every stage on a tiny set, and one sentence for every mistake."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from datagen.formats import read_pfm
+from stereoforge.cli import main
+from stereoforge.commands import COMMANDS
+from stereoforge.demo import DemoPlan, DemoResult, run_demo
+
+RenderTiny = ["render", "--scenes", "1", "--size", "64x36", "--samples", "1", "--workers", "1"]
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, DemoResult]:
+    """The demo with next to no scenes and steps: every stage is the real one."""
+    plan = DemoPlan(
+        scenes={"train": 2, "val": 1, "test": 1}, steps={"regressor": 3, "confnet": 2, "gradnet": 2}
+    )
+    small = DemoPlan(type(plan.world)(width=384, height=192), plan.scenes, plan.steps, gallery_scenes=2)
+    out = tmp_path_factory.mktemp("demo") / "demo"
+    return out, run_demo(out, small)
+
+
+def run(*arguments: str | Path) -> int:
+    """The exit code of a command."""
+    with pytest.raises(SystemExit) as end:
+        main([str(argument) for argument in arguments])
+    return int(end.value.code or 0)
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Runs a command that must fail with one sentence; returns the sentence."""
+
+    def call(code: int, *arguments: str | Path) -> str:
+        assert run(*arguments) == code
+        lines = capsys.readouterr().err.strip().splitlines()
+        assert len(lines) == 1, lines
+        assert lines[0].startswith("stereoforge: ")
+        return lines[0]
+
+    return call
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_every_command_has_help_with_defaults(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(command, "--help") == 0
+    text = capsys.readouterr().out
+    assert f"stereoforge {command}" in text
+    assert "--" in text
+
+
+def test_the_module_and_the_script_are_one_program() -> None:
+    done = subprocess.run([sys.executable, "-m", "stereoforge", "--help"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert set(COMMANDS) <= set(done.stdout.replace(",", " ").split()) | {"verify"}
+
+
+def test_wrong_flags_exit_with_2(tmp_path: Path, refused: Callable[..., str]) -> None:
+    assert "--samples" in refused(2, "render", "--out", tmp_path / "set", "--samples", "many")
+    assert "meant --samples?" in refused(2, "render", "--out", tmp_path / "set", "--sampels", "4")
+    assert "Missing from stereoforge render: --out DIR" in refused(2, "render")
+    assert "evaluate" in refused(2, "paint")
+    assert "WIDTHxHEIGHT" in refused(2, "render", "--out", tmp_path / "set", "--size", "big")
+    assert "at least 1" in refused(2, "render", "--out", tmp_path / "set", "--samples", "0")
+    assert "no --family swimming" in refused(2, "render", "--out", tmp_path / "set", "--family", "swimming")
+    assert "I/N" in refused(2, "render", "--out", tmp_path / "set", "--shard", "4/4")
+    assert not (tmp_path / "set").exists()
+
+
+def test_no_data_and_wrong_folders_are_sentences(tmp_path: Path, refused: Callable[..., str]) -> None:
+    missing, empty = tmp_path / "missing", tmp_path / "empty"
+    empty.mkdir()
+    (empty / "note.txt").write_text("not a data set")
+    for folder in (missing, empty):
+        for command in (
+            ("verify", folder),
+            ("view", folder, "--out", tmp_path / "page.html"),
+            ("train", "regressor", "--data", folder, "--out", tmp_path / "run"),
+            ("evaluate", folder, "--weights", tmp_path / "run", "--out", tmp_path / "report"),
+        ):
+            assert str(folder) in refused(1, *command)
+    assert "neither empty nor a data set" in refused(1, *RenderTiny, "--out", empty)
+    assert not (tmp_path / "page.html").exists()
+
+
+@pytest.mark.slow
+def test_the_demo_leaves_what_it_promises(demo: tuple[Path, DemoResult]) -> None:
+    out, result = demo
+    numbers = json.loads((out / "report" / "results.json").read_text())
+    assert set(numbers["set"]["methods"]) >= {"regressor", "gradnet", "ours", "ours_conf_gt"}
+    for page in (result.report, result.gallery):
+        text = page.read_text()
+        assert "<html" in text
+        assert "https://" not in text.replace("https://www.w3.org", "")
+    assert all(
+        (result.weights / f"{name}.safetensors").is_file() for name in ("regressor", "confnet", "gradnet")
+    )
+    assert result.evaluation.scores["ours"].regions["all"].epe > 0
+
+
+@pytest.mark.slow
+def test_the_demo_continues_what_is_there(demo: tuple[Path, DemoResult]) -> None:
+    out, _ = demo
+    files = [*out.glob("weights/*.safetensors"), *out.glob("data/manifest/*/*/*.json")]
+    before = {path: path.read_bytes() for path in files}
+    plan = DemoPlan(
+        type(DemoPlan().world)(width=384, height=192),
+        {"train": 2, "val": 1, "test": 1},
+        {"regressor": 3, "confnet": 2, "gradnet": 2},
+        gallery_scenes=2,
+    )
+    run_demo(out, plan)
+    assert {path: path.read_bytes() for path in files} == before
+
+
+@pytest.mark.slow
+def test_refine_writes_what_it_promises(demo: tuple[Path, DemoResult], tmp_path: Path) -> None:
+    out, _ = demo
+    pair = [next(out.glob(f"data/frames_cleanpass/TEST/A/0000/{eye}/*.png")) for eye in ("left", "right")]
+    assert run("refine", *pair, "--weights", out / "weights", "--out", tmp_path / "r") == 0
+    names = {path.name for path in (tmp_path / "r").iterdir()}
+    assert names >= {
+        "disparity.pfm",
+        "disparity_initial.pfm",
+        "confidence.pfm",
+        "gradient.exr",
+        "overview.png",
+    }
+    refined = read_pfm(tmp_path / "r" / "disparity.pfm")
+    assert refined.shape == (192, 384)
+    assert np.isfinite(refined).all()
+
+
+@pytest.mark.slow
+def test_refine_says_what_is_wrong_with_its_inputs(
+    demo: tuple[Path, DemoResult], tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    out, _ = demo
+    left = next(out.glob("data/frames_cleanpass/TEST/A/0000/left/*.png"))
+    broken, small = tmp_path / "broken.png", tmp_path / "small.png"
+    broken.write_bytes(left.read_bytes()[:2000])
+    iio.imwrite(small, np.zeros((30, 40, 3), np.uint8))
+    common = ("--weights", out / "weights", "--out", tmp_path / "r")
+    assert "broken.png" in refused(1, "refine", broken, left, *common)
+    assert "missing.png" in refused(1, "refine", left, tmp_path / "missing.png", *common)
+    assert "40x30" in refused(1, "refine", left, small, *common)
+    weightless = ("--weights", tmp_path / "nothing", "--out", tmp_path / "r")
+    assert "nothing" in refused(1, "refine", left, left, *weightless)
+    part = tmp_path / "part"
+    part.mkdir()
+    for file in (out / "weights").glob("regressor.*"):
+        shutil.copy(file, part)
+    assert "no confnet" in refused(1, "refine", left, left, "--weights", part, "--out", tmp_path / "r")
+    (part / "regressor.safetensors").write_bytes(b"\\x00" * 64)
+    assert "regressor.safetensors" in refused(
+        1, "refine", left, left, "--weights", part, "--out", tmp_path / "r"
+    )
+    assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "victim",
+    [
+        "frames_cleanpass/TEST/A/0000/right/0006.png",
+        "disparity/TEST/A/0000/left/0006.pfm",
+        "disparity_gradient/TEST/A/0000/left/0006.exr",
+        "occlusion/TEST/A/0000/left/0006.png",
+    ],
+)
+def test_damaged_files_are_named_wherever_they_are_read(
+    demo: tuple[Path, DemoResult],
+    tmp_path: Path,
+    refused: Callable[..., str],
+    victim: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out, _ = demo
+    root = tmp_path / "data"
+    shutil.copytree(out / "data", root)
+    path = root / victim
+    path.write_bytes(path.read_bytes()[:-300])
+    assert run("verify", root) == 1
+    assert victim in "".join(capsys.readouterr().out.split())
+    if "gradient" not in victim:  # the evaluation derives gradients from the disparity
+        sentence = refused(1, "evaluate", root, "--weights", out / "weights", "--out", tmp_path / "report")
+        assert victim in sentence
+        assert not (tmp_path / "report").exists()
+
+
+def test_debug_shows_the_traceback(tmp_path: Path) -> None:
+    with pytest.raises(Exception, match="missing"):
+        main(["verify", str(tmp_path / "missing"), "--debug"])
