@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -60,16 +61,16 @@ def _parse(words: Sequence[str]) -> Any:
 
 
 def _one_sentence(complaint: str) -> str:
-    """What a box of tyro's says: its first part, the first suggestion of a later part, where to read more."""
-    lines = [line.strip("│ ") for line in complaint.splitlines() if not line.startswith(("╭", "╰"))]
-    parts = [[word for word in part.split() if word.strip("─")] for part in "\n".join(lines).split("─" * 10)]
-    sentence = " ".join(parts[0]).split(" Got errors:")[0]
-    for part in parts[1:]:
-        text = " ".join(part)
-        if text.startswith("Perhaps you meant:"):
-            sentence += f" (perhaps you meant {part[3]}?)"
-        elif text.startswith("Available subcommands:"):
-            sentence += f" ({text[0].lower()}{text[1:]})"
+    """What one of tyro's boxes says, drawn with lines or with dashes: title, complaint, suggestions."""
+    bare = complaint.translate(dict.fromkeys(map(ord, "╭╮╰╯│"), " "))
+    parts = [" ".join(part.split()) for part in re.split(r"[─-]{5,}", bare)]
+    _, said, *others = [part for part in parts if part.strip("─ ")]
+    sentence = said.split(" Got errors:")[0]
+    for other in others:
+        if other.startswith("Perhaps you meant:"):
+            sentence += f" (perhaps you meant {other.split()[3]}?)"
+        elif other.startswith("Available subcommands:"):
+            sentence += f" (a{other[1:]})"
     return sentence
 
 

@@ -77,12 +77,12 @@ def test_overfits_four_samples(data: Path, tmp_path: Path) -> None:
         optimizer=replace(presets["regressor"].optimizer, learning_rate=3e-3, weight_decay=0.0),
     )
     final = {}
-    for task, steps in {"regressor": 300, "confnet": 100, "gradnet": 100}.items():
+    for task, steps in {"regressor": 900, "confnet": 150, "gradnet": 150}.items():
         train(task, [(data, 1.0)], tmp_path, presets[task], steps=steps, progress=False)
         losses = scalars(tmp_path, task, "train/loss")
         final[task] = losses[max(losses)]
-    # The regressor's is the sum over its scales, 0.2 of each coarse one.
-    assert final["regressor"] < 1.5
+    # A weighted sum over six scales whose weights add up to 2: under 0.85 px on average.
+    assert final["regressor"] < 1.7
     assert final["confnet"] < 0.3
     assert final["gradnet"] < 0.04
 
