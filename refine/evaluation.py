@@ -80,7 +80,8 @@ class MethodScore:
     gradient_all: float
     """Gradient error over every pixel, discontinuities included."""
     seconds: float
-    """Mean wall-clock time a frame."""
+    """Mean wall-clock time a frame: of the networks for what they predict, else of the method by itself, on top
+    of what it is given."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +192,7 @@ class _Run:
             began = time.perf_counter()
             output = method.run(frame)
             pool = _Pool(self.options)
-            pool.add(frame, output, time.perf_counter() - began)
+            pool.add(frame, output, time.perf_counter() - began + output.seconds)
             self.pools[method.name].merge(pool)
             scores[method.name] = pool.score()
             if output.disparity is not None:

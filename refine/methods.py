@@ -17,6 +17,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+PAPER_FIRST = ("regressor", "regressor_f", "gradnet", "sgbm", "wmf", "color", "tgv", "fbs", "grad")
+PAPER_LAST = ("ours", "ours_conf_gt")
+
 
 @dataclass(frozen=True)
 class EvaluationFrame:
@@ -35,8 +38,14 @@ class EvaluationFrame:
     """(H, W) in [0, 1], probability that the initial disparity is right."""
     gradient: NDArray[np.float32] | None = None
     """(H, W, 2) as [dx, dy], the predicted disparity gradient."""
+    right: NDArray[np.uint8] | None = None
+    """(H, W, 3), the right view of the pair."""
+    fine_tuned: NDArray[np.float32] | None = None
+    """(H, W) disparity of a regressor fine-tuned on gradients too (the paper's eq. 9)."""
     other_confidences: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     """Further confidence measures to compare, by name: (H, W), higher is surer, any scale."""
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    """How long it took to predict a field, by its name."""
 
     def __post_init__(self) -> None:
         size = self.truth.shape
@@ -49,6 +58,10 @@ class EvaluationFrame:
             shapes["confidence"] = (self.confidence.shape, size)
         if self.gradient is not None:
             shapes["gradient"] = (self.gradient.shape, (*size, 2))
+        if self.right is not None:
+            shapes["right"] = (self.right.shape, (*size, 3))
+        if self.fine_tuned is not None:
+            shapes["fine_tuned"] = (self.fine_tuned.shape, size)
         for name, values in self.other_confidences.items():
             shapes[f"confidence {name!r}"] = (values.shape, size)
         for name, (got, expected) in shapes.items():
@@ -64,6 +77,8 @@ class MethodOutput:
     """(H, W) pixels; None for a method that predicts gradients only."""
     gradient: NDArray[np.float32] | None = None
     """(H, W, 2) [dx, dy]; None where the disparity's own forward differences are to be measured."""
+    seconds: float = 0.0
+    """Time spent beforehand on what is only handed on, to be added to the time that `run` takes."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +93,9 @@ class Method(ABC):
     """Whether it looks at the ground truth: no rival, but the room that is left."""
     needs: ClassVar[frozenset[str]] = frozenset()
     """Optional fields of `EvaluationFrame` the method cannot do without."""
+    search: ClassVar[Mapping[str, tuple[float | int | str, ...]]] = {}
+    """What validation may choose from: for a field (`parameters.alpha` for a field of a record) its values in
+    order, the default among them."""
 
     @abstractmethod
     def run(self, frame: EvaluationFrame) -> MethodOutput:
@@ -104,15 +122,22 @@ def known_methods() -> Mapping[str, type[Method]]:
     return methods
 
 
+def table_order() -> tuple[str, ...]:
+    """Every method's name in the order of the tables: the paper's, and before the last of them what it has not."""
+    names = known_methods()
+    last = tuple(name for name in PAPER_LAST if name in names)
+    first = tuple(name for name in PAPER_FIRST if name in names)
+    return (*first, *sorted(names.keys() - {*first, *last}), *last)
+
+
 def default_methods(names: tuple[str, ...] = ()) -> tuple[Method, ...]:
-    """Methods with their default parameters: those named, in that order, or the paper's main rows.
+    """Methods with their default parameters: those named, in that order, or all there are.
 
     Raises:
         ValueError: If a name is not known.
     """
     known = known_methods()
-    chosen = names or ("regressor", "gradnet", "ours", "ours_conf_gt")
-    for name in chosen:
+    for name in names:
         if name not in known:
             raise ValueError(f"there is no method {name!r}; known are {', '.join(sorted(known))}")
-    return tuple(known[name]() for name in chosen)
+    return tuple(known[name]() for name in names or table_order())

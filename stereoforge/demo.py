@@ -16,11 +16,11 @@ from refine.evaluation import Evaluation
 from scenes.families.flying_things import FlyingThingsConfig
 from stereoforge.errors import CommandError
 from stereoforge.evaluation import evaluate_datasets, report_evaluation
+from stereoforge.prediction import open_predictors
 from stereoforge.progress import console, progress_bar
-from training.predict import StereoPredictor
 from training.train import train
 
-NETWORKS = ("regressor", "confnet", "gradnet")
+NETWORKS = ("regressor", "confnet", "gradnet", "regressor_f")
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,9 @@ class DemoPlan:
         )
     )
     scenes: dict[str, int] = field(default_factory=lambda: {"train": 36, "val": 4, "test": 5})
-    steps: dict[str, int] = field(default_factory=lambda: {"regressor": 1600, "confnet": 200, "gradnet": 200})
+    steps: dict[str, int] = field(
+        default_factory=lambda: {"regressor": 1600, "confnet": 200, "gradnet": 200, "regressor_f": 100}
+    )
     """Training steps of each network's `tiny` preset."""
     gallery_scenes: int = 16
 
@@ -65,7 +67,7 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
             train(network, [(data, 1.0)], weights, "tiny", steps=plan.steps[network], resume=True)
     test = StereoDataset(data, "test")
     with _stage(f"refining and evaluating {len(test)} test pairs"):
-        evaluation = evaluate_datasets([test], StereoPredictor(weights))
+        evaluation = evaluate_datasets([test], open_predictors(weights))
     minutes = (time.monotonic() - started) / 60
     files = report_evaluation(
         evaluation, [test], weights, out / "report", _limits(plan, minutes), "StereoForge demo"

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from datagen import StereoDataset, StereoSample
-from refine.evaluation import Evaluation, EvaluationFrame, evaluate
+from datagen import StereoDataset
+from refine.evaluation import Evaluation, evaluate
 from refine.methods import default_methods
 from refine.report import ReportContext, ReportFiles, write_report
+from stereoforge.prediction import Predictors
 from stereoforge.progress import progress_bar
-from training.predict import StereoPredictor
 
 
 def evaluate_datasets(
-    datasets: Sequence[StereoDataset], predictor: StereoPredictor, methods: tuple[str, ...] = ()
+    datasets: Sequence[StereoDataset], predictors: Predictors, methods: tuple[str, ...] = ()
 ) -> Evaluation:
     """Run the networks and every method on every frame, showing progress."""
     samples = [sample for dataset in datasets for sample in dataset]
@@ -22,24 +22,10 @@ def evaluate_datasets(
     with progress_bar() as progress:
         task = progress.add_task("evaluating", total=len(samples))
         return evaluate(
-            (predict_frame(sample, predictor) for sample in samples),
+            (predictors.frame(sample) for sample in samples),
             chosen,
             progress=lambda done, _: progress.update(task, completed=done),
         )
-
-
-def predict_frame(sample: StereoSample, predictor: StereoPredictor) -> EvaluationFrame:
-    """One sample with what the networks say about it."""
-    prediction = predictor.predict(sample.left, sample.right)
-    return EvaluationFrame(
-        name=sample.name,
-        image=sample.left,
-        truth=sample.disparity_left,
-        occlusion=sample.occlusion_left,
-        disparity=prediction.disparity,
-        confidence=prediction.confidence,
-        gradient=prediction.gradient,
-    )
 
 
 def report_evaluation(

@@ -17,4 +17,4 @@ class GradNet(Method):
     needs: ClassVar[frozenset[str]] = frozenset({"gradient"})
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
-        return MethodOutput(gradient=frame.gradient)
+        return MethodOutput(gradient=frame.gradient, seconds=frame.seconds.get("gradient", 0.0))

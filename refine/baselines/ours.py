@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from refine.confidence_shape import ConfidenceShape
 from refine.methods import EvaluationFrame, Method, MethodOutput
-from refine.mrf import DEFAULT_TOLERANCE, SolverName, refine_disparity
+from refine.mrf import DEFAULT_TOLERANCE, MRFSolution, SolverName, solve_mrf
 from refine.parameters import MRFParameters
 from refine.system import Form
 
@@ -18,20 +19,37 @@ class Ours(Method):
     name: ClassVar[str] = "ours"
     label: ClassVar[str] = "Ours"
     needs: ClassVar[frozenset[str]] = frozenset({"confidence", "gradient"})
+    search: ClassVar = {
+        "parameters.sigma_r": (1.0, 1.7, 2.55, 4.0, 6.0, 10.0, 16.0),
+        "shape.power": (0.5, 1.0, 2.0, 3.0, 4.0),
+        "parameters.alpha": (3.0, 10.0, 30.0, 100.0, 300.0),
+        "parameters.beta": (0.01, 0.03, 0.1, 0.3, 1.0, 3.0),
+        "shape.temperature": (0.5, 0.7, 1.0, 1.5),
+        "parameters.confidence_floor": (1e-5, 1e-4, 1e-3, 3e-3, 1e-2),
+    }
 
     parameters: MRFParameters = field(default_factory=MRFParameters)
+    shape: ConfidenceShape = field(default_factory=ConfidenceShape)
     form: Form = "exact"
     solver: SolverName = "auto"
     tolerance: float = DEFAULT_TOLERANCE
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        return MethodOutput(disparity=self.solve(frame).disparity.astype("float32"))
+
+    def solve(self, frame: EvaluationFrame) -> MRFSolution:
+        """`run`, with the solver's account.
+
+        Raises:
+            ValueError: If the frame has no confidence or no gradient, or values the MRF cannot take.
+        """
         if frame.confidence is None or frame.gradient is None:
             raise ValueError(
                 f"{self.label} needs {', '.join(self.missing(frame))}; frame {frame.name} has none"
             )
-        refined = refine_disparity(
+        return solve_mrf(
             frame.disparity,
-            frame.confidence,
+            self.shape.apply(frame.confidence),
             frame.gradient,
             frame.image,
             self.parameters,
@@ -39,4 +57,3 @@ class Ours(Method):
             self.solver,
             self.tolerance,
         )
-        return MethodOutput(disparity=refined)

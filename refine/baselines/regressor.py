@@ -16,4 +16,4 @@ class Regressor(Method):
     label: ClassVar[str] = "Regressor"
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
-        return MethodOutput(disparity=frame.disparity)
+        return MethodOutput(disparity=frame.disparity, seconds=frame.seconds.get("disparity", 0.0))

@@ -24,7 +24,7 @@ class Evaluate:
     """Folder for the report."""
     split: Literal["train", "val", "test"] = "test"
     """Which split of the data sets."""
-    methods: Annotated[str, shown("LIST")] = "regressor,gradnet,ours,ours_conf_gt"
+    methods: Annotated[str, shown("LIST", "all there are")] = ""
     """Rows of the tables, comma-separated."""
     device: Annotated[str, shown("NAME")] = "cpu"
     """What the networks run on: cpu, cuda, ..."""
@@ -34,7 +34,7 @@ class Evaluate:
         from refine.methods import default_methods
         from stereoforge.errors import UsageError
         from stereoforge.evaluation import evaluate_datasets, report_evaluation
-        from training.predict import StereoPredictor
+        from stereoforge.prediction import open_predictors
 
         methods = tuple(name.strip() for name in self.methods.split(",") if name.strip())
         try:
@@ -44,7 +44,7 @@ class Evaluate:
         if not self.data:
             raise UsageError("evaluate needs at least one data set")
         datasets = [StereoDataset(root, self.split) for root in self.data]
-        evaluation = evaluate_datasets(datasets, StereoPredictor(self.weights, self.device), methods)
+        evaluation = evaluate_datasets(datasets, open_predictors(self.weights, self.device), methods)
         files = report_evaluation(evaluation, datasets, self.weights, self.out)
         for name, reason in evaluation.skipped.items():
             console.print(f"{name} did not run: {reason}", markup=False)

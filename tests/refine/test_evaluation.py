@@ -19,6 +19,7 @@ from refine.methods import Method, MethodOutput, default_methods, known_methods
 from refine.metrics import bad_pixel_rate, end_point_error, forward_gradient, gradient_error
 from tests.refine.worlds import toy_frame
 
+MAIN_ROWS = default_methods(("regressor", "gradnet", "ours", "ours_conf_gt"))
 FLAT = np.full((2, 3), 10.0, np.float32)
 
 
@@ -68,7 +69,7 @@ def test_a_discontinuity_counts_in_the_unmasked_gradient_error_only():
 
 def test_every_row_agrees_with_the_metrics_on_the_whole():
     frames = [toy_frame(seed) for seed in range(3)]
-    evaluation = evaluate(frames)
+    evaluation = evaluate(frames, MAIN_ROWS)
     assert list(evaluation.scores) == ["regressor", "gradnet", "ours", "ours_conf_gt"]
     refined = [refine_disparity(f.disparity, f.confidence, f.gradient, f.image) for f in frames]
     labels = [(np.abs(f.disparity - f.truth) <= 1).astype(float) for f in frames]
@@ -112,7 +113,7 @@ def test_frames_are_read_one_at_a_time_and_progress_is_told():
 
 def test_methods_without_their_inputs_are_skipped_and_named():
     frame = replace(toy_frame(0, 12, 16), confidence=None)
-    evaluation = evaluate([frame])
+    evaluation = evaluate([frame], MAIN_ROWS)
     assert list(evaluation.scores) == ["regressor", "gradnet", "ours_conf_gt"]
     assert evaluation.skipped == {"ours": "Ours needs confidence, which the frames lack"}
     assert evaluation.judged == "regressor"

@@ -13,10 +13,12 @@ import pytest
 
 from refine.evaluation import evaluate
 from refine.lens import most_improved_boundary, worst_boundary
+from refine.methods import default_methods
 from refine.overview import overview_picture
 from refine.report import ReportContext, write_report
 from tests.refine.worlds import toy_frame
 
+MAIN_ROWS = default_methods(("regressor", "gradnet", "ours", "ours_conf_gt"))
 VOID = {"meta", "img", "input", "link", "br", "hr"}
 
 
@@ -70,7 +72,7 @@ def evaluation():
     frames = [toy_frame(seed) for seed in range(6)]
     error = np.abs(frames[0].disparity - frames[0].truth)
     frames[0] = replace(frames[0], other_confidences={"lrc": -error})
-    return evaluate(frames)
+    return evaluate(frames, MAIN_ROWS)
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +136,7 @@ def test_csv_json_and_page_hold_the_same_numbers(evaluation, written, page):
 
 def test_frames_that_share_a_name_keep_their_own_numbers(tmp_path):
     frames = [toy_frame(seed) for seed in (0, 1)]
-    evaluation = evaluate([frames[0], replace(frames[1], name=frames[0].name)])
+    evaluation = evaluate([frames[0], replace(frames[1], name=frames[0].name)], MAIN_ROWS)
     document = json.loads(write_report(evaluation, tmp_path).json.read_text())
     errors = [frame["methods"]["ours"]["epe_all"] for frame in document["frames"]]
     assert errors == [frame.methods["ours"].regions["all"].epe for frame in evaluation.frames]
@@ -170,7 +172,7 @@ def test_writing_again_replaces_and_leaves_no_litter(evaluation, written):
 def test_a_report_of_one_frame_without_networks(tmp_path):
     frame = replace(toy_frame(0), confidence=None, gradient=None, truth=np.full((48, 80), 8.0, np.float32))
     frame.disparity[:12] = np.nan
-    files = write_report(evaluate([frame]), tmp_path)
+    files = write_report(evaluate([frame], MAIN_ROWS), tmp_path)
     parser = Page()
     parser.feed(files.html.read_text())
     assert parser.open == []

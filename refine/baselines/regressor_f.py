@@ -1,0 +1,24 @@
+"""The paper's rival DispNetCorr1D_F: the regressor fine-tuned so that its gradients fit, instead of refined."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from refine.methods import EvaluationFrame, Method, MethodOutput
+
+
+@dataclass(frozen=True)
+class RegressorF(Method):
+    """The disparity of the regressor fine-tuned with the paper's eq. 9.
+
+    The loss is mean |l| + lambda mean(|dx l| + |dy l|) of the error l, lambda = 5; `stereoforge train regressor_f`
+    makes the network, whose length of training the paper does not tell.
+    """
+
+    name: ClassVar[str] = "regressor_f"
+    label: ClassVar[str] = "Regressor, fine-tuned"
+    needs: ClassVar[frozenset[str]] = frozenset({"fine_tuned"})
+
+    def run(self, frame: EvaluationFrame) -> MethodOutput:
+        return MethodOutput(disparity=frame.fine_tuned, seconds=frame.seconds.get("fine_tuned", 0.0))

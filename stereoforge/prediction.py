@@ -1,0 +1,52 @@
+"""From a pair of pictures to what the refinement and the evaluation take in."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from datagen import StereoSample
+from refine.evaluation import EvaluationFrame
+from training.predict import StereoPredictor
+from training.weights import has_weights
+
+
+@dataclass(frozen=True)
+class Predictors:
+    """Everything of a run folder that says something about a pair."""
+
+    networks: StereoPredictor
+    fine_tuned: StereoPredictor | None
+    """The regressor fine-tuned on gradients, where there is one."""
+
+    def frame(self, sample: StereoSample) -> EvaluationFrame:
+        """One sample with all that is predicted for it, and how long that took."""
+        began = time.perf_counter()
+        prediction = self.networks.predict(sample.left, sample.right)
+        seconds = {"disparity": time.perf_counter() - began}
+        fine_tuned = None
+        if self.fine_tuned is not None:
+            began = time.perf_counter()
+            fine_tuned = self.fine_tuned.predict(sample.left, sample.right).disparity
+            seconds["fine_tuned"] = time.perf_counter() - began
+        return EvaluationFrame(
+            name=sample.name,
+            image=sample.left,
+            truth=sample.disparity_left,
+            occlusion=sample.occlusion_left,
+            disparity=prediction.disparity,
+            confidence=prediction.confidence,
+            gradient=prediction.gradient,
+            right=sample.right,
+            fine_tuned=fine_tuned,
+            seconds=seconds,
+        )
+
+
+def open_predictors(run: Path, device: str = "cpu") -> Predictors:
+    """What a run folder holds; raises TrainingError, naming what is wrong."""
+    return Predictors(
+        networks=StereoPredictor(run, device),
+        fine_tuned=(StereoPredictor(run, device, "regressor_f") if has_weights(run, "regressor_f") else None),
+    )

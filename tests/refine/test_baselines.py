@@ -1,0 +1,351 @@
+"""Every baseline against an oracle that shares no code with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from matching import SGBMParameters
+from refine import MRFParameters, refine_disparity
+from refine.baselines.color import Color
+from refine.baselines.fbs import FBS
+from refine.baselines.grad import Grad
+from refine.baselines.ours import Ours
+from refine.baselines.ours_conf_gt import OursConfGT
+from refine.baselines.regressor_f import RegressorF
+from refine.baselines.sgbm import SGBM
+from refine.baselines.tgv import TGV, edge_tensor
+from refine.baselines.wmf import WMF, weighted_median
+from refine.confidence_shape import ConfidenceShape
+from refine.evaluation import EvaluationFrame, evaluate
+from refine.methods import known_methods
+from tests.refine.oracles import dense_minimiser
+from tests.refine.worlds import random_problem, toy_frame
+from tests.training.synthetic import random_pair
+
+
+def frame_of(height: int, width: int, seed: int, style: str = "mixed") -> EvaluationFrame:
+    problem = random_problem(height, width, seed, style)
+    return EvaluationFrame(
+        name=f"{style} {seed}",
+        image=problem.image,
+        truth=problem.disparity.astype(np.float32),
+        occlusion=np.zeros((height, width), np.uint8),
+        disparity=problem.disparity.astype(np.float32),
+        confidence=problem.confidence.astype(np.float32),
+        gradient=problem.gradient.astype(np.float32),
+    )
+
+
+# Weighted median
+
+
+def median_by_sorting(values: np.ndarray, image: np.ndarray, radius: int, sigma: float) -> np.ndarray:
+    height, width = values.shape
+    result = np.full_like(values, np.nan)
+    for y in range(height):
+        for x in range(width):
+            window = []
+            for v in range(max(0, y - radius), min(height, y + radius + 1)):
+                for u in range(max(0, x - radius), min(width, x + radius + 1)):
+                    if not math.isnan(values[v, u]):
+                        squared = sum(
+                            (float(a) - float(b)) ** 2 for a, b in zip(image[y, x], image[v, u], strict=True)
+                        )
+                        window.append((values[v, u], math.exp(-squared / (2 * sigma**2))))
+            window.sort()
+            half, passed = sum(weight for _, weight in window) / 2, 0.0
+            for value, weight in window:
+                passed += weight
+                if passed >= half:
+                    result[y, x] = value
+                    break
+    return result
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    height=st.integers(1, 9),
+    width=st.integers(1, 9),
+    radius=st.integers(0, 4),
+    sigma=st.sampled_from([5.0, 25.5]),
+    holes=st.sampled_from([0.0, 0.3, 1.0]),
+    coarse=st.booleans(),
+    seed=st.integers(0, 99),
+)
+def test_weighted_median_equals_sorting(height, width, radius, sigma, holes, coarse, seed):
+    """Ties included: coarse values repeat, on a constant image with equal weights."""
+    rng = np.random.default_rng(seed)
+    problem = random_problem(height, width, seed, "constant" if coarse else "mixed")
+    values = np.rint(problem.disparity / 20) if coarse else problem.disparity
+    values = np.where(rng.random((height, width)) < holes, np.nan, values).astype(np.float32)
+    expected = median_by_sorting(values, problem.image, radius, sigma)
+    np.testing.assert_array_equal(weighted_median(values, problem.image, radius, sigma), expected)
+
+
+def test_the_library_quantises_where_ours_does_not():
+    """OpenCV's filter agrees but for its 256 bins and clusters: why it is not used."""
+    frame = frame_of(24, 32, 3, "blocks")
+    library = cv2.ximgproc.weightedMedianFilter(frame.image, frame.disparity, 3, sigma=25.5)
+    ours = WMF(radius_px=3).run(frame).disparity
+    assert np.median(np.abs(library - ours)) < 60 / 256
+    assert (library != ours).mean() > 0.25
+
+
+# Colour and gradient terms alone
+
+
+def test_color_and_grad_are_the_mrf_without_the_other_term():
+    problem = random_problem(6, 7, 5)
+    frame = frame_of(6, 7, 5)
+    color = dense_minimiser(problem, MRFParameters(0.0, 2.0, 4.0, 1e-2))
+    np.testing.assert_allclose(
+        Color(beta=2.0, sigma_r=4.0, confidence_floor=1e-2).run(frame).disparity, color, atol=1e-3
+    )
+    grad = dense_minimiser(problem, MRFParameters(30.0, 0.0, 4.0, 1e-2))
+    np.testing.assert_allclose(
+        Grad(alpha=30.0, sigma_r=4.0, confidence_floor=1e-2).run(frame).disparity, grad, atol=1e-3
+    )
+
+
+def test_colors_unsquared_form_is_eq_8_and_its_small_sigma_is_levins():
+    frame = frame_of(6, 7, 1, "noise")
+    level = np.zeros((6, 7, 2))
+    printed = refine_disparity(
+        frame.disparity, frame.confidence, level, frame.image, MRFParameters(0.0, 1.0), form="paper"
+    )
+    np.testing.assert_allclose(Color(form="paper").run(frame).disparity, printed, atol=1e-4)
+    # Where all phi are 0 the prior has weight 2 everywhere, whatever sigma_r.
+    results = [Color(sigma_r=sigma).run(frame).disparity for sigma in (0.1, 0.2)]
+    np.testing.assert_allclose(*results, atol=1e-4)
+
+
+def test_shapes_of_confidence():
+    confidence = np.array([[0.0, 0.1, 0.5, 0.8, 1.0]], np.float32)
+    np.testing.assert_allclose(ConfidenceShape(power=2).apply(confidence), confidence**2, atol=1e-6)
+    logits = np.log(confidence[0, 1:-1] / (1 - confidence[0, 1:-1]))
+    softened = ConfidenceShape(temperature=2).apply(confidence)[0]
+    np.testing.assert_allclose(softened[1:-1], 1 / (1 + np.exp(-logits / 2)), atol=1e-6)
+    assert (softened[[0, -1]] == [0, 1]).all()
+    with pytest.raises(ValueError, match="temperature must be positive"):
+        ConfidenceShape(temperature=0)
+
+
+def test_ours_shapes_its_confidence():
+    frame = toy_frame(0, 20, 24)
+    squared = refine_disparity(frame.disparity, frame.confidence.clip(0, 1) ** 2, frame.gradient, frame.image)
+    got = Ours(shape=ConfidenceShape(power=2)).run(replace(frame, confidence=frame.confidence.clip(0, 1)))
+    np.testing.assert_allclose(got.disparity, squared, atol=1e-3)
+
+
+# Fast bilateral solver
+
+
+def dense_bilateral_solution(frame: EvaluationFrame, method: FBS) -> np.ndarray:
+    """The solver's published equation over a dictionary of vertices, dense, with numpy's own solver."""
+    height, width = frame.disparity.shape
+    vertices: dict[tuple[int, ...], list[tuple[int, int]]] = {}
+    for y in range(height):
+        for x in range(width):
+            r, g, b = (Fraction(int(c)) for c in frame.image[y, x])
+            luma = (299 * r + 587 * g + 114 * b) / 1000
+            cb = 128 + (-168736 * r - 331264 * g + 500000 * b) / 1000000
+            cr = 128 + (500000 * r - 418688 * g - 81312 * b) / 1000000
+            sides = (method.sigma_spatial_px,) * 2 + (method.sigma_luma,) + (method.sigma_chroma,) * 2
+            place = zip((x, y, luma, cb, cr), sides, strict=True)
+            cell = tuple(math.floor(value / Fraction(side)) for value, side in place)
+            vertices.setdefault(cell, []).append((y, x))
+    cells = list(vertices)
+    blur = np.zeros((len(cells), len(cells)))
+    for i, one in enumerate(cells):
+        for j, other in enumerate(cells):
+            apart = [abs(a - b) for a, b in zip(one, other, strict=True)]
+            blur[i, j] = 10 if i == j else float(sum(apart) == 1)
+    count = np.array([len(pixels) for pixels in vertices.values()], float)
+    scale = np.ones(len(cells))
+    for _ in range(10):
+        scale = np.sqrt(scale * count / (blur @ scale))
+    mass = scale * (blur @ scale)
+    trust = np.maximum(np.where(np.isnan(frame.disparity), 0, frame.confidence), method.confidence_floor)
+    known = np.nan_to_num(frame.disparity)
+    data = np.array([sum(trust[p] for p in pixels) for pixels in vertices.values()])
+    wanted = np.array([sum(trust[p] * known[p] for p in pixels) for pixels in vertices.values()])
+    a = method.smoothness * (np.diag(mass) - np.diag(scale) @ blur @ np.diag(scale)) + np.diag(data)
+    solution = np.linalg.solve(a, wanted)
+    result = np.empty((height, width))
+    for value, pixels in zip(solution, vertices.values(), strict=True):
+        for pixel in pixels:
+            result[pixel] = value
+    return result
+
+
+@pytest.mark.parametrize("style", ["noise", "smooth", "constant", "blocks"])
+@pytest.mark.parametrize("method", [FBS(), FBS(4.0, 8.0, 16.0, 8.0, 1e-2)])
+def test_bilateral_solver_agrees_with_a_dense_computation(style, method):
+    frame = frame_of(13, 17, 2, style)
+    expected = dense_bilateral_solution(frame, method)
+    np.testing.assert_allclose(method.run(frame).disparity, expected, atol=0.01)
+
+
+def test_the_affinity_is_bistochastic_enough():
+    """Every pixel's affinities sum to 1: with more of the published iterations, as closely as one likes."""
+    from refine.baselines.fbs import bilateral_grid, bistochastic
+
+    splat, blur = bilateral_grid(random_problem(20, 24, 0, "blocks").image, (4.0, 16.0, 16.0))
+    pixels = np.asarray(splat.sum(axis=1))
+    errors = [np.abs(bistochastic(splat, blur, n)[1] / pixels - 1).max() for n in (10, 40)]
+    assert errors[1] < 1e-6 < errors[0] < 0.1
+
+
+# TGV
+
+
+def tgv_by_reweighting(frame: EvaluationFrame, method: TGV) -> tuple[np.ndarray, np.ndarray]:
+    """The minimiser by iteratively reweighted least squares, dense: each norm as a square over its last size."""
+    height, width = frame.disparity.shape
+    size = height * width
+    tensor = edge_tensor(frame.image, method.tensor_strength, method.tensor_exponent).astype(float)
+    place = np.arange(size).reshape(height, width)
+    first, second = [], []
+    for y in range(height):
+        for x in range(width):
+            steps = np.zeros((2, 3 * size))
+            bends = np.zeros((4, 3 * size))
+            for axis, (ny, nx) in enumerate(((y, x + 1), (y + 1, x))):
+                if ny < height and nx < width:
+                    steps[axis, [place[ny, nx], place[y, x]]] = 1, -1
+                    steps[axis, (1 + axis) * size + place[y, x]] = -1
+                    for c in (0, 1):
+                        bends[2 * axis + c, (1 + c) * size + place[ny, nx]] = 1
+                        bends[2 * axis + c, (1 + c) * size + place[y, x]] = -1
+            xx, yy, xy = tensor[y, x]
+            first.append(np.array([[xx, xy], [xy, yy]]) @ steps)
+            second.append(bends)
+    first, second = np.array(first), np.array(second)
+    data = np.zeros((size, 3 * size))
+    data[np.arange(size), np.arange(size)] = 1
+    weight = method.data_weight * frame.confidence.ravel().astype(float)
+    solution = np.concatenate([frame.disparity.ravel().astype(float), np.zeros(2 * size)])
+    for step in range(90):
+        small = max(1e-6, 10.0 ** (-step / 10))
+        matrix = data.T * weight @ data + 1e-12 * np.eye(3 * size)
+        for terms, alpha in ((first, method.alpha1), (second, method.alpha0)):
+            sizes = np.sqrt(((terms @ solution) ** 2).sum(axis=1) + small**2)
+            rows = terms / np.sqrt(sizes)[:, None, None]
+            rows = rows.reshape(-1, 3 * size)
+            matrix += alpha * rows.T @ rows
+        solution = np.linalg.solve(matrix, data.T @ (weight * frame.disparity.ravel()))
+    u, vx, vy = solution.reshape(3, height, width)
+    return u, np.stack([vx, vy], axis=2)
+
+
+def test_tgv_matches_a_reference_convex_solve():
+    method = TGV(iterations=4000, tolerance_px=0.0)
+    toy = frame_of(6, 8, 4, "blocks")
+    target = (4 + np.arange(8) * 0.5 + (np.arange(8) > 4) * 9 + 0.2 * toy.disparity / 60).astype(np.float32)
+    frame = replace(toy, disparity=np.broadcast_to(target, (6, 8)).copy())
+    expected_u, expected_v = tgv_by_reweighting(frame, method)
+    inputs = (frame.disparity, frame.confidence, frame.image)
+    u, v = method.solve(*inputs)
+    best = method.energy(expected_u, expected_v, *inputs)
+    assert method.energy(u, v, *inputs) == pytest.approx(best, rel=0.01)
+    np.testing.assert_allclose(u, expected_u, atol=0.05)
+
+
+def test_tgv_lowers_its_energy_and_keeps_planes():
+    frame = toy_frame(1)
+    inputs = (frame.disparity, frame.confidence, frame.image)
+    energies = [
+        TGV().energy(*replace(TGV(), iterations=n, tolerance_px=0.0).solve(*inputs), *inputs)
+        for n in (10, 100, 500, 2000)
+    ]
+    level = np.zeros((*frame.disparity.shape, 2), np.float32)
+    assert TGV().energy(frame.disparity, level, *inputs) > energies[0] > energies[1] > energies[2]
+    assert energies[2] < 1.03 * energies[3]
+    y, x = np.mgrid[:20, :30]
+    plane = (5 + 0.3 * x + 0.2 * y).astype(np.float32)
+    image = random_problem(20, 30, 0, "noise").image
+    flat, _ = TGV(iterations=5000, tolerance_px=0.0).solve(plane, np.ones_like(plane), image)
+    np.testing.assert_allclose(flat, plane, atol=0.02)
+
+
+# All of them
+
+
+def full_frame(seed: int = 0) -> EvaluationFrame:
+    frame = toy_frame(seed)
+    return replace(frame, right=np.roll(frame.image, -6, axis=1), fine_tuned=frame.truth + np.float32(0.25))
+
+
+def test_every_method_runs_on_a_frame_and_is_timed():
+    methods = [method() for method in known_methods().values()]
+    frame = replace(full_frame(), seconds={"disparity": 2.0, "fine_tuned": 3.0})
+    evaluation = evaluate([frame], methods)
+    assert evaluation.skipped == {}
+    assert set(evaluation.scores) == {
+        *("regressor", "regressor_f", "gradnet", "sgbm", "wmf", "color", "tgv", "fbs", "grad", "ours"),
+        "ours_conf_gt",
+    }
+    assert all(score.seconds > 0 for score in evaluation.scores.values())
+    assert evaluation.scores["regressor"].seconds == pytest.approx(2.0, abs=0.1)
+    assert evaluation.scores["regressor_f"].seconds == pytest.approx(3.0, abs=0.1)
+    assert evaluation.scores["regressor_f"].regions["all"].epe == pytest.approx(0.25)
+    before = evaluation.scores["regressor"].regions["all"].epe
+    for name in ("color", "tgv", "fbs", "grad", "ours", "ours_conf_gt"):
+        assert evaluation.scores[name].regions["all"].epe < before, name
+
+
+@pytest.mark.parametrize("name", ["wmf", "color", "tgv", "fbs", "grad", "ours"])
+def test_holes_and_tiny_images_are_taken(name):
+    method = known_methods()[name]()
+    frame = full_frame()
+    disparity = frame.disparity.copy()
+    disparity[5:9, 10:60] = np.nan
+    filled = method.run(replace(frame, disparity=disparity)).disparity
+    assert np.isfinite(filled).all()
+    assert np.abs(filled - frame.truth)[:, 60:].mean() < 8
+    for height, width in ((1, 1), (1, 9), (9, 1)):
+        frame = frame_of(height, width, 0)
+        result = method.run(frame).disparity
+        assert result.shape == (height, width)
+        assert result.dtype == np.float32
+        assert np.isfinite(result).all()
+
+
+def test_search_values_are_fields_and_hold_the_defaults():
+    for name, kind in known_methods().items():
+        for path, values in kind.search.items():
+            value = kind()
+            for part in path.split("."):
+                value = getattr(value, part)
+            assert value in values, f"{name}: {path} = {value} is not among {values}"
+
+
+def test_sgbm_row_fills_its_holes():
+    pair = random_pair(np.random.default_rng(0), 64, 128)
+    frame = EvaluationFrame(
+        "pair",
+        pair.left,
+        pair.disparity_left,
+        np.zeros((64, 128), np.uint8),
+        pair.disparity_left,
+        right=pair.right,
+    )
+    found = SGBM(SGBMParameters(max_disparity_px=48)).run(frame).disparity
+    assert np.isfinite(found).all()
+    assert np.median(np.abs(found - pair.disparity_left)) < 0.5
+    assert RegressorF().missing(frame) == ("fine_tuned",)
+
+
+def test_the_upper_bound_follows_the_mrf_it_is_given():
+    frame = toy_frame(0, 20, 24)
+    weak = OursConfGT(mrf=Ours(MRFParameters(alpha=1e-6, beta=1e-6))).run(frame).disparity
+    right = np.abs(frame.disparity - frame.truth) <= 1
+    np.testing.assert_allclose(weak[right], frame.disparity[right], atol=0.05)
