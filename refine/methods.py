@@ -96,6 +96,8 @@ class Method(ABC):
     search: ClassVar[Mapping[str, tuple[float | int | str, ...]]] = {}
     """What validation may choose from: for a field (`parameters.alpha` for a field of a record) its values in
     order, the default among them."""
+    follows: ClassVar[Mapping[str, str]] = {}
+    """Fields that hold another method, by its name: they take that method's validated parameters."""
 
     @abstractmethod
     def run(self, frame: EvaluationFrame) -> MethodOutput:

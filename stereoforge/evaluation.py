@@ -7,23 +7,22 @@ from pathlib import Path
 
 from datagen import StereoDataset
 from refine.evaluation import Evaluation, evaluate
-from refine.methods import default_methods
+from refine.methods import Method
 from refine.report import ReportContext, ReportFiles, write_report
 from stereoforge.prediction import Predictors
 from stereoforge.progress import progress_bar
 
 
 def evaluate_datasets(
-    datasets: Sequence[StereoDataset], predictors: Predictors, methods: tuple[str, ...] = ()
+    datasets: Sequence[StereoDataset], predictors: Predictors, methods: tuple[Method, ...] = ()
 ) -> Evaluation:
     """Run the networks and every method on every frame, showing progress."""
     samples = [sample for dataset in datasets for sample in dataset]
-    chosen = default_methods(methods)
     with progress_bar() as progress:
         task = progress.add_task("evaluating", total=len(samples))
         return evaluate(
             (predictors.frame(sample) for sample in samples),
-            chosen,
+            methods,
             progress=lambda done, _: progress.update(task, completed=done),
         )
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from datagen import StereoSample
 from refine.evaluation import EvaluationFrame
+from refine.settings import FILE_NAME, Settings, read_settings
 from training.predict import StereoPredictor
 from training.weights import has_weights
 
@@ -50,3 +51,12 @@ def open_predictors(run: Path, device: str = "cpu") -> Predictors:
         networks=StereoPredictor(run, device),
         fine_tuned=(StereoPredictor(run, device, "regressor_f") if has_weights(run, "regressor_f") else None),
     )
+
+
+def open_settings(file: Path | None, run: Path | None) -> Settings:
+    """The methods' parameters: of the file, or of the one in the run folder, or the defaults."""
+    if file is not None:
+        return read_settings(file)
+    if run is not None and (run / FILE_NAME).exists():
+        return read_settings(run / FILE_NAME)
+    return Settings()

@@ -46,3 +46,15 @@ def parse_weighted_folder(text: str) -> tuple[Path, float]:
     if not 0 < weight < float("inf"):
         raise UsageError(f"--data {text}: the weight must be positive, got {number}")
     return Path(folder), weight
+
+
+def parse_methods(text: str) -> tuple[str, ...]:
+    """Names of methods out of "ours,wmf"; empty for all there are."""
+    from refine.methods import default_methods
+
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    try:
+        default_methods(names)
+    except ValueError as error:
+        raise UsageError(f"--methods: {error}") from error
+    return names

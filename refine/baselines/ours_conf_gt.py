@@ -22,6 +22,7 @@ class OursConfGT(Method):
     label: ClassVar[str] = "Ours, true confidence"
     upper_bound: ClassVar[bool] = True
     needs: ClassVar[frozenset[str]] = frozenset({"gradient"})
+    follows: ClassVar = {"mrf": "ours"}
 
     mrf: Ours = field(default_factory=Ours)
     threshold: float = 1.0

@@ -8,6 +8,7 @@ from stereoforge.commands.evaluate import Evaluate
 from stereoforge.commands.refine import Refine
 from stereoforge.commands.render import Render
 from stereoforge.commands.train import Train
+from stereoforge.commands.tune import Tune
 from stereoforge.commands.verify import Verify
 from stereoforge.commands.view import View
 
@@ -24,6 +25,7 @@ COMMANDS: dict[str, Callable[..., Command]] = {
     "verify": Verify,
     "view": View,
     "train": Train,
+    "tune": Tune,
     "refine": Refine,
     "evaluate": Evaluate,
     "demo": Demo,

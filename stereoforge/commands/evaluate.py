@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from stereoforge.progress import console
-from stereoforge.values import shown
+from stereoforge.values import parse_methods, shown
 
 
 @dataclass(frozen=True)
@@ -26,25 +26,27 @@ class Evaluate:
     """Which split of the data sets."""
     methods: Annotated[str, shown("LIST", "all there are")] = ""
     """Rows of the tables, comma-separated."""
+    parameters: Annotated[
+        Path | None, shown("FILE", "parameters.json in the run folder, if there is one")
+    ] = None
+    """The methods' parameters, as `stereoforge tune` writes them."""
     device: Annotated[str, shown("NAME")] = "cpu"
     """What the networks run on: cpu, cuda, ..."""
 
     def run(self) -> None:
         from datagen import StereoDataset
-        from refine.methods import default_methods
         from stereoforge.errors import UsageError
         from stereoforge.evaluation import evaluate_datasets, report_evaluation
-        from stereoforge.prediction import open_predictors
+        from stereoforge.prediction import open_predictors, open_settings
 
-        methods = tuple(name.strip() for name in self.methods.split(",") if name.strip())
-        try:
-            default_methods(methods)
-        except ValueError as error:
-            raise UsageError(f"--methods: {error}") from error
+        methods = parse_methods(self.methods)
         if not self.data:
             raise UsageError("evaluate needs at least one data set")
         datasets = [StereoDataset(root, self.split) for root in self.data]
-        evaluation = evaluate_datasets(datasets, open_predictors(self.weights, self.device), methods)
+        settings = open_settings(self.parameters, self.weights)
+        evaluation = evaluate_datasets(
+            datasets, open_predictors(self.weights, self.device), settings.rows(methods)
+        )
         files = report_evaluation(evaluation, datasets, self.weights, self.out)
         for name, reason in evaluation.skipped.items():
             console.print(f"{name} did not run: {reason}", markup=False)

@@ -13,10 +13,15 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 
+from datagen import StereoDataset
 from datagen.formats import read_pfm
+from refine.methods import known_methods
+from refine.settings import read_settings
+from refine.tuning import measure
 from stereoforge.cli import main
 from stereoforge.commands import COMMANDS
 from stereoforge.demo import DemoPlan, DemoResult, run_demo
+from stereoforge.prediction import open_predictors
 
 RenderTiny = ["render", "--scenes", "1", "--size", "64x36", "--samples", "1", "--workers", "1"]
 
@@ -25,7 +30,8 @@ RenderTiny = ["render", "--scenes", "1", "--size", "64x36", "--samples", "1", "-
 def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, DemoResult]:
     """The demo with next to no scenes and steps: every stage is the real one."""
     plan = DemoPlan(
-        scenes={"train": 2, "val": 1, "test": 1}, steps={"regressor": 3, "confnet": 2, "gradnet": 2}
+        scenes={"train": 2, "val": 1, "test": 1},
+        steps={"regressor": 3, "confnet": 2, "gradnet": 2, "regressor_f": 2},
     )
     small = DemoPlan(type(plan.world)(width=384, height=192), plan.scenes, plan.steps, gallery_scenes=2)
     out = tmp_path_factory.mktemp("demo") / "demo"
@@ -99,7 +105,8 @@ def test_no_data_and_wrong_folders_are_sentences(tmp_path: Path, refused: Callab
 def test_the_demo_leaves_what_it_promises(demo: tuple[Path, DemoResult]) -> None:
     out, result = demo
     numbers = json.loads((out / "report" / "results.json").read_text())
-    assert set(numbers["set"]["methods"]) >= {"regressor", "gradnet", "ours", "ours_conf_gt"}
+    assert set(numbers["set"]["methods"]) == set(known_methods())
+    assert all(row["seconds"] > 0 for row in numbers["set"]["methods"].values())
     for page in (result.report, result.gallery):
         text = page.read_text()
         assert "<html" in text
@@ -118,7 +125,7 @@ def test_the_demo_continues_what_is_there(demo: tuple[Path, DemoResult]) -> None
     plan = DemoPlan(
         type(DemoPlan().world)(width=384, height=192),
         {"train": 2, "val": 1, "test": 1},
-        {"regressor": 3, "confnet": 2, "gradnet": 2},
+        {"regressor": 3, "confnet": 2, "gradnet": 2, "regressor_f": 2},
         gallery_scenes=2,
     )
     run_demo(out, plan)
@@ -168,6 +175,29 @@ def test_refine_says_what_is_wrong_with_its_inputs(
         1, "refine", left, left, "--weights", part, "--out", tmp_path / "r"
     )
     assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.slow
+def test_tuned_parameters_are_evaluated_with(demo: tuple[Path, DemoResult], tmp_path: Path) -> None:
+    out, _ = demo
+    file, common = tmp_path / "parameters.json", (out / "data", "--weights", out / "weights")
+    assert run("tune", *common, "--out", file, "--methods", "wmf,grad", "--frames", "1") == 0
+    tuned = read_settings(file)
+    assert set(tuned.methods) == {"wmf", "grad"}
+    assert tuned.about["split"] == "val"
+    assert all("VAL" in name for name in tuned.about["frames"])
+    report = ("--out", tmp_path / "report", "--methods", "wmf", "--parameters", file)
+    assert run("evaluate", *common, *report, "--split", "val") == 0
+    got = json.loads((tmp_path / "report" / "results.json").read_text())["set"]["methods"]["wmf"]
+    frames = [open_predictors(out / "weights").frame(sample) for sample in StereoDataset(out / "data", "val")]
+    assert got["epe_all"] == pytest.approx(measure(tuned.methods["wmf"], frames).epe)
+
+
+def test_tune_refuses_the_test_split_and_unknown_methods(tmp_path: Path, refused: Callable[..., str]) -> None:
+    common = ("tune", tmp_path, "--weights", tmp_path)
+    assert "--split" in refused(2, *common, "--split", "test")
+    assert "no method 'magic'" in refused(2, *common, "--methods", "magic")
+    assert "--frames" in refused(2, *common, "--frames", "0")
 
 
 @pytest.mark.slow

@@ -1,0 +1,64 @@
+"""`stereoforge tune`: choose every method's parameters on the validation split."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from stereoforge.errors import UsageError
+from stereoforge.progress import console
+from stereoforge.values import parse_methods, shown
+
+
+@dataclass(frozen=True)
+class Tune:
+    """Choose the parameters of the refinement and of every baseline on the validation split, and only there.
+
+    A coordinate search: each parameter in turn moves along a short list of values while the errors, relative to the
+    initial disparity's, fall. Run it again to continue where it stopped.
+    """
+
+    data: Annotated[tyro.conf.Positional[tuple[Path, ...]], shown("DATA")]
+    """Data sets; their validation splits are used."""
+    weights: Annotated[Path, shown("RUN")]
+    """Run folder of the networks."""
+    out: Annotated[Path | None, shown("FILE", "parameters.json in the run folder")] = None
+    """File for the parameters. One in the run folder is used by evaluate and refine without being named."""
+    methods: Annotated[str, shown("LIST", "all there are")] = ""
+    """Methods to tune, comma-separated."""
+    frames: Annotated[int, shown("N")] = 20
+    """Validation frames looked at, evenly spread; all are kept in memory."""
+    objective: Literal["balanced", "bad", "epe", "gradient"] = "balanced"
+    """What shall be small: bad pixels, end-point error, gradient error, or the mean of the three."""
+    device: Annotated[str, shown("NAME")] = "cpu"
+    """What the networks run on: cpu, cuda, ..."""
+
+    def run(self) -> None:
+        if self.frames < 1:
+            raise UsageError(f"--frames must be at least 1, got {self.frames}")
+        if not self.data:
+            raise UsageError("tune needs at least one data set")
+        methods = parse_methods(self.methods)
+        from rich.table import Table
+
+        from datagen import StereoDataset
+        from refine.settings import FILE_NAME
+        from stereoforge.prediction import open_predictors
+        from stereoforge.tuning import VALIDATION, Tuning, describe, shown_values, validation_frames
+
+        datasets = [StereoDataset(root, VALIDATION) for root in self.data]
+        frames = validation_frames(datasets, open_predictors(self.weights, self.device), self.frames)
+        out = self.weights / FILE_NAME if self.out is None else self.out
+        tuned = Tuning(frames, out, describe(frames, self.data, self.objective), self.objective).run(methods)
+        table = Table(
+            "method", "default", "tuned", "parameters", title=f"{self.objective}, relative to the input"
+        )
+        for name, result in tuned.items():
+            if result.trials:
+                values = (f"{value:.3f}" for value in (result.default_objective, result.objective))
+                table.add_row(name, *values, shown_values(result.method))
+        console.print(table)
+        console.print(f"{out}: {len(tuned)} methods, validated on {len(frames)} frames", markup=False)

@@ -1,0 +1,74 @@
+"""A search over frames: resumed where it was interrupted, and never on a test split."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import stereoforge.tuning as tuning
+from refine.settings import read_settings
+from stereoforge.errors import CommandError
+from stereoforge.tuning import Tuning, describe, validation_frames
+from tests.refine.worlds import toy_frame
+
+
+def frames_with_networks():
+    frames = [toy_frame(seed, 20, 30) for seed in (0, 1)]
+    return [replace(frame, confidence=frame.confidence.clip(0, 1)) for frame in frames]
+
+
+def search(out: Path, frames=None) -> Tuning:
+    frames = frames or frames_with_networks()
+    return Tuning(frames, out, describe(frames, [Path("data")], "balanced"))
+
+
+def test_an_interrupted_search_ends_as_an_uninterrupted_one(tmp_path, monkeypatch):
+    names = ("wmf", "grad", "ours")
+    whole = search(tmp_path / "whole.json").run(names)
+    assert whole["ours_conf_gt"].method.mrf == whole["ours"].method
+
+    measure, calls = tuning.measure, 0
+
+    def interrupted(method, frames):
+        nonlocal calls
+        calls += 1
+        if calls == 14:
+            raise KeyboardInterrupt
+        return measure(method, frames)
+
+    monkeypatch.setattr(tuning, "measure", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        search(tmp_path / "part.json").run(names)
+    part = read_settings(tmp_path / "part.json")
+    assert part.about["whole"] is False
+    assert sum(map(len, part.trials.values())) == 12
+    search(tmp_path / "part.json").run(names)
+    assert (tmp_path / "part.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
+    trials = sum(len(result.trials) for result in whole.values())
+    # Two runs, each of which measured the initial disparity, one trial that was interrupted, and no trial twice.
+    assert calls == trials + 2 + 1
+
+
+def test_another_set_of_frames_starts_anew_and_another_method_joins(tmp_path):
+    out = tmp_path / "parameters.json"
+    search(out).run(("wmf",))
+    search(out).run(("grad",))
+    assert set(read_settings(out).methods) == {"wmf", "grad"}
+    search(out, frames_with_networks()[:1]).run(("grad",))
+    assert set(read_settings(out).methods) == {"grad"}
+
+
+def test_methods_without_inputs_or_parameters_are_left_out(tmp_path):
+    frames = [replace(frame, gradient=None, confidence=None) for frame in frames_with_networks()]
+    assert set(search(tmp_path / "p.json", frames).run()) == {"wmf"}
+
+
+def test_a_test_split_is_refused():
+    dataset = SimpleNamespace(split="test", layout=SimpleNamespace(root=Path("worlds")))
+    with pytest.raises(
+        CommandError, match="worlds: parameters are chosen on the validation split, never on test"
+    ):
+        validation_frames([dataset], None, 5)
