@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,9 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.errors import DatasetError
-from datagen.formats import read_gradient, read_occlusion, read_pfm, read_png
+from datagen.formats import (
+    read_flow,
+    read_gradient,
+    read_mask,
+    read_normals,
+    read_occlusion,
+    read_pfm,
+    read_png,
+)
 from datagen.formats.png import read_png_size
-from datagen.layout import EYES, RENDER_PASSES, SPLITS, Eye, Layout
+from datagen.layout import EYES, RENDER_PASSES, SPLITS, Direction, Eye, Layout
 from datagen.manifest import read_manifest
 from scenes import Scene, scene_from_json
 
@@ -131,6 +139,27 @@ class StereoSample:
             object_index=getattr(self, f"object_index_{eye}"),
         )
 
+    def material_index(self, eye: Eye) -> NDArray[np.uint16]:
+        """(H, W) 0 sky, else 1 + index in the scene's materials. Needs the target, as the methods below do;
+        what they return is read anew at each call."""
+        return self._extra("material_index", eye, read_png, (), np.uint16)
+
+    def normals(self, eye: Eye) -> NDArray[np.float32]:
+        """(H, W, 3) unit vectors in the camera's frame (x right, y up, z back), 0 for the sky."""
+        return self._extra("normals", eye, read_normals, (3,), np.float32)
+
+    def flow(self, eye: Eye, direction: Direction) -> NDArray[np.float32]:
+        """(H, W, 2) px [right, down] to where the pixel's point is one frame on; NaN invalid."""
+        return self._extra("optical_flow", eye, read_flow, (2,), np.float32, direction)
+
+    def disparity_change(self, eye: Eye, direction: Direction) -> NDArray[np.float32]:
+        """(H, W) px the disparity of the pixel's point grows by until one frame on; NaN invalid."""
+        return self._extra("disparity_change", eye, read_pfm, (), np.float32, direction)
+
+    def motion_boundaries(self, eye: Eye, direction: Direction) -> NDArray[np.bool_]:
+        """(H, W) where objects that move differently meet."""
+        return self._extra("motion_boundaries", eye, read_mask, (), np.bool_, direction)
+
     @cached_property
     def scene_record(self) -> Scene:
         """The world that was rendered, with its camera."""
@@ -148,8 +177,8 @@ class StereoSample:
     def _image_kind(self) -> str:
         return RENDER_PASSES[self.render_pass]
 
-    def _file(self, kind: str, eye: Eye) -> Path:
-        return self.layout.file(kind, self.split, self.scene, eye, self.frame)
+    def _file(self, kind: str, eye: Eye, direction: Direction | None = None) -> Path:
+        return self.layout.file(kind, self.split, self.scene, eye, self.frame, direction)
 
     def _image(self, eye: Eye) -> NDArray[np.uint8]:
         path = self._file(self._image_kind, eye)
@@ -180,6 +209,20 @@ class StereoSample:
         index = read_png(path)
         self._check(path, index, self.size, np.uint16)
         return index  # type: ignore[return-value]
+
+    def _extra(
+        self,
+        kind: str,
+        eye: Eye,
+        read: Callable[[Path], NDArray[Any]],
+        channels: tuple[int, ...],
+        dtype: type,
+        direction: Direction | None = None,
+    ) -> NDArray[Any]:
+        path = self._file(kind, eye, direction)
+        values = read(path)
+        self._check(path, values, (*self.size, *channels), dtype)
+        return values
 
     def _check(self, path: Path, array: NDArray[Any], shape: tuple[int, ...], dtype: type) -> None:
         if array.shape != shape or array.dtype != dtype:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,9 @@ from datagen.ground_truth import (
     gradient_validity,
     to_camera_frame,
 )
-from datagen.layout import EYES, Eye
+from datagen.layout import EYES, Direction, Eye
 from datagen.scene_geometry import SceneGeometry
+from datagen.surface_targets import ExtraTargets
 from scenes import Scene
 
 BLENDER_LOG = "blender.log"
@@ -30,10 +32,10 @@ LOG_LINES_SHOWN = 5
 
 @dataclass(frozen=True)
 class EyeTargets:
-    """One eye's picture and ground truth, as they are stored."""
+    """One eye's pictures and ground truth, as they are stored."""
 
-    image: NDArray[np.uint8]
-    """(H, W, 3) sRGB."""
+    images: dict[str, NDArray[np.uint8]]
+    """(H, W, 3) sRGB of each pass, by its name."""
     disparity: NDArray[np.float32]
     """(H, W) px."""
     gradient: NDArray[np.float32]
@@ -44,6 +46,8 @@ class EyeTargets:
     """(H, W) 0 visible, 1 occluded, 2 out of the other frame."""
     object_index: NDArray[np.uint16]
     """(H, W) 0 where nothing is hit, else 1 + the index in `Scene.objects`."""
+    extra: dict[tuple[str, Direction | None], NDArray[Any]]
+    """The targets asked for besides, by kind and direction."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,8 @@ class RenderOptions:
     threads: int = 1
     gradient_threshold_px: float = 1.0
     """Larger forward differences are discontinuities: invalid as gradient targets."""
+    targets: tuple[str, ...] = ()
+    """Which of `EXTRA_TARGETS` to make."""
 
 
 @dataclass
@@ -78,12 +84,17 @@ class BlenderError(RuntimeError):
 
 
 def render_frames(
-    scene: Scene, scratch: Path, options: RenderOptions | None = None, watch: Stopwatch | None = None
+    scene: Scene,
+    scratch: Path,
+    options: RenderOptions | None = None,
+    watch: Stopwatch | None = None,
+    geometry: SceneGeometry | None = None,
 ) -> Iterator[tuple[int, dict[Eye, EyeTargets]]]:
     """Yield (frame, both eyes' arrays) for every frame of a scene, frames counted from 0.
 
-    scratch: an existing folder for Blender's temporary files and its log. Blender keeps one world a process,
-    so one iterator at a time. Raises BlenderError, and RuntimeError on a Python without bpy.
+    scratch: an existing folder for Blender's temporary files and its log. geometry: the scene's, if it has
+    been built already. Blender keeps one world a process, so one iterator at a time. Raises BlenderError, and
+    RuntimeError on a Python without bpy.
     """
     # Imported here so that planning, verifying and training work on a Python without Blender.
     from datagen.blender.build import build_world, place
@@ -96,8 +107,10 @@ def render_frames(
     exposure: float | None = None
     try:
         with watch.step("build"), quiet(log):
+            geometry = geometry or SceneGeometry(scene)
             settings = CyclesSettings(options.samples, options.device, options.threads)
-            world = build_world(SceneGeometry(scene), start_empty_file(settings))
+            world = build_world(geometry, start_empty_file(settings))
+        extra_targets = ExtraTargets(geometry, options.targets)
         for frame in range(scene.frames):
             with watch.step("render"), quiet(log):
                 views = {eye: render_view(world, eye, frame, scratch) for eye in EYES}
@@ -108,11 +121,12 @@ def render_frames(
                     exposure = automatic_exposure(views["left"].radiance, scene.exposure_key)
                 targets = {
                     eye: _targets(
-                        develop(view.radiance, exposure),
+                        {"clean": develop(view.radiance, exposure)},
                         disparity_from_depth(view.depth_m, scene.camera.disparity_metres),
                         options.gradient_threshold_px,
                         tester.labels(eye, view.depth_m),
                         view.object_index,
+                        extra_targets.make(eye, frame, view.object_index),
                     )
                     for eye, view in views.items()
                 }
@@ -123,15 +137,16 @@ def render_frames(
 
 
 def _targets(
-    image: NDArray[np.uint8],
+    images: dict[str, NDArray[np.uint8]],
     disparity: NDArray[np.float32],
     gradient_threshold_px: float,
     occlusion: NDArray[np.uint8],
     object_index: NDArray[np.uint16],
+    extra: dict[tuple[str, Direction | None], NDArray[Any]],
 ) -> EyeTargets:
     gradient = forward_differences(disparity)
     valid = gradient_validity(gradient, gradient_threshold_px)
-    return EyeTargets(image, disparity, gradient, valid, occlusion, object_index)
+    return EyeTargets(images, disparity, gradient, valid, occlusion, object_index, extra)
 
 
 def _occlusion_tester(scene: Scene, frame: int, triangles: NDArray[np.float64]) -> OcclusionTester:

@@ -21,6 +21,9 @@ from datagen.errors import DatasetError
 SPLITS = ("train", "val", "test")
 Eye = Literal["left", "right"]
 EYES: tuple[Eye, Eye] = ("left", "right")
+Direction = Literal["into_future", "into_past"]
+DIRECTIONS: tuple[Direction, Direction] = ("into_future", "into_past")
+"""To the instant one frame later, and one frame earlier."""
 
 FIRST_FRAME = 6
 LETTER = "A"
@@ -35,6 +38,13 @@ class Kind:
     extension: str
     per_eye: bool = True
     """One file an eye and frame; otherwise one file a scene, named after the kind."""
+    over_time: bool = False
+    """One file a direction, eye and frame."""
+
+    @property
+    def directions(self) -> tuple[Direction | None, ...]:
+        """What `Layout.file` takes as the direction of this kind."""
+        return DIRECTIONS if self.over_time else (None,)
 
 
 KINDS = {
@@ -46,12 +56,19 @@ KINDS = {
         Kind("disparity_gradient", ".exr"),
         Kind("occlusion", ".png"),
         Kind("object_index", ".png"),
+        Kind("material_index", ".png"),
+        Kind("normals", ".exr"),
+        Kind("optical_flow", ".pfm", over_time=True),
+        Kind("disparity_change", ".pfm", over_time=True),
+        Kind("motion_boundaries", ".pgm", over_time=True),
         Kind("camera_data", ".txt", per_eye=False),
     )
 }
 """Every kind of data file by its name, which is also its folder's."""
 TARGETS = ("disparity", "disparity_gradient", "occlusion", "object_index", "camera_data")
 """The kinds every scene has, whichever passes were rendered."""
+EXTRA_TARGETS = ("material_index", "normals", "optical_flow", "disparity_change", "motion_boundaries")
+"""The kinds a recipe may ask for besides."""
 RENDER_PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
 
 _RECORD_NAME = re.compile(r"(\d{4}|[1-9]\d{4,})\.json")
@@ -68,9 +85,16 @@ class Layout:
         return self._group(KINDS[kind].folder, split) / _number(scene)
 
     def file(
-        self, kind: str, split: str, scene: int, eye: str | None = None, frame: int | None = None
+        self,
+        kind: str,
+        split: str,
+        scene: int,
+        eye: str | None = None,
+        frame: int | None = None,
+        direction: Direction | None = None,
     ) -> Path:
-        """A data file. Kinds with files an eye need `eye` and the frame's number (`FIRST_FRAME` + t)."""
+        """A data file. Kinds with files an eye need `eye` and the frame's number (`FIRST_FRAME` + t), those
+        over time a direction as well."""
         entry, folder = KINDS[kind], self.scene_folder(kind, split, scene)
         if not entry.per_eye:
             return folder / f"{entry.folder}{entry.extension}"
@@ -79,7 +103,13 @@ class Layout:
                 f"a file of {kind} needs an eye, left or right, and a frame from {FIRST_FRAME} up, "
                 f"got {eye!r} and {frame}"
             )
-        return folder / eye / f"{_number(frame)}{entry.extension}"
+        if direction not in entry.directions:
+            raise ValueError(f"a file of {kind} has no direction {direction!r}")
+        name = _number(frame)
+        if kind == "optical_flow":
+            towards = "IntoFuture" if direction == "into_future" else "IntoPast"
+            name = f"OpticalFlow{towards}_{name}_{eye[0].upper()}"
+        return folder / (direction or "") / eye / f"{name}{entry.extension}"
 
     def scene_record(self, split: str, scene: int) -> Path:
         return self._group("scenes", split) / f"{_number(scene)}.json"

@@ -28,6 +28,16 @@ class Hits:
     """(N,) 0 visible, 1 occluded, 2 out of the other frame."""
 
 
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Which point of which triangle some pixels' centres show."""
+
+    triangle: NDArray[np.int64]
+    """(N,) row of `SceneGeometry.triangles`, -1 where nothing is hit."""
+    weights: NDArray[np.float64]
+    """(N, 3) barycentric coordinates, exact where the ray meets the triangle's plane; 0 where nothing is."""
+
+
 class SceneRayCaster:
     """Casts rays from either eye at the triangles of a scene.
 
@@ -45,15 +55,12 @@ class SceneRayCaster:
         Embree finds the triangle in 32 bits; the distance to its plane is then computed in 64 bits.
         """
         camera = self._scene.camera
-        pair = RectifiedPair(camera.width, camera.height, camera.focal_px, camera.baseline_m)
-        directions = pair.rays()[rows, columns]
+        directions = self._directions(rows, columns)
         disparity, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
         hidden = np.zeros(len(directions), bool)
         if len(self._geometry.triangles):
-            if time_frames != self._instant:
-                self._place(time_frames)
-            eyes = np.array([0.0, 0.0, 0.0]), np.array([camera.baseline_m, 0.0, 0.0])
-            own, other = eyes if eye == "left" else eyes[::-1]
+            self._place(time_frames)
+            own, other = self._eyes(eye)
             disparity, index = self._first_hits(own, directions)
             hidden = self._hidden(own, other, directions, disparity)
         x_other = columns + 0.5 + (-disparity if eye == "left" else disparity)
@@ -61,10 +68,42 @@ class SceneRayCaster:
         labels = np.where(outside, OUT_OF_FRAME, np.where(hidden, OCCLUDED, VISIBLE))
         return Hits(disparity, index, labels.astype(np.uint8))
 
+    def surface_points(
+        self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
+    ) -> SurfacePoints:
+        """What is seen through the centres of the pixels (rows, columns), both (N,)."""
+        directions = self._directions(rows, columns)
+        triangle, weights = np.full(len(directions), -1, np.int64), np.zeros((len(directions), 3))
+        if len(self._geometry.triangles):
+            self._place(time_frames)
+            own, _ = self._eyes(eye)
+            triangle = self._nearest(own, directions)
+            met = triangle >= 0
+            a, b, c = np.moveaxis(self._vertices[self._geometry.triangles[triangle[met]]] - own, 1, 0)
+            ray = directions[met]
+            # Of a ray r from the origin through a triangle a, b, c: det(r, b, c) and its rotations.
+            parts = [np.einsum("ij,ij->i", ray, np.cross(*pair)) for pair in ((b, c), (c, a), (a, b))]
+            weights[met] = np.stack(parts, -1) / np.sum(parts, axis=0)[:, None]
+        return SurfacePoints(triangle, weights)
+
+    def _directions(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
+        camera = self._scene.camera
+        pair = RectifiedPair(camera.width, camera.height, camera.focal_px, camera.baseline_m)
+        return pair.rays()[rows, columns]
+
+    def _eyes(self, eye: Eye) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Where this eye and the other one are in the left eye's frame."""
+        left, right = np.zeros(3), np.array([self._scene.camera.baseline_m, 0.0, 0.0])
+        return (left, right) if eye == "left" else (right, left)
+
+    def _nearest(self, origin: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.int64]:
+        """(N,) the triangle each ray meets first, -1 for none."""
+        return self._run(origin, directions, "INTERSECT", np.full(len(directions), _FAR))
+
     def _first_hits(
         self, origin: NDArray[np.float64], directions: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        hit = self._run(origin, directions, "INTERSECT", np.full(len(directions), _FAR))
+        hit = self._nearest(origin, directions)
         met = hit >= 0
         corners = self._vertices[self._geometry.triangles[hit[met]]] - origin
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -106,6 +145,8 @@ class SceneRayCaster:
 
     def _place(self, time_frames: float) -> None:
         """Put all triangles where they are at an instant."""
+        if time_frames == self._instant:
+            return
         to_left_eye = np.linalg.inv(self._scene.camera.pose("left", time_frames))
         self._vertices = self._geometry.vertices(time_frames, to_left_eye)
         self._embree = EmbreeScene(robust=True)

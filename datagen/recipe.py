@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from datagen.errors import DatasetError
-from datagen.layout import SPLITS
+from datagen.layout import EXTRA_TARGETS, SPLITS
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
 from scenes.serialization import from_plain, to_plain
 from storage import write_text
@@ -32,6 +32,8 @@ class Recipe:
     samples: int = 4
     """Paths a pixel for the pictures; ground truth is exact whatever this is."""
     passes: tuple[str, ...] = ("clean",)
+    targets: tuple[str, ...] = ()
+    """Targets besides disparity, gradient, occlusion and object index, which are always made."""
     gradient_threshold_px: float = 1.0
     """Jumps above this are discontinuities, masked out of the gradient targets."""
 
@@ -43,6 +45,11 @@ class Recipe:
                 raise DatasetError(f"the number of {split} scenes must not be negative, got {count}")
         if not self.passes or not set(self.passes) <= set(PASSES):
             raise DatasetError(f"passes must be among {', '.join(PASSES)}, got {', '.join(self.passes)!r}")
+        unknown = sorted(set(self.targets) - set(EXTRA_TARGETS))
+        if unknown:
+            raise DatasetError(
+                f"targets must be among {', '.join(EXTRA_TARGETS)}, got {', '.join(unknown)!r}"
+            )
         at_least_one = {
             "samples": self.samples,
             "width": self.world.width,

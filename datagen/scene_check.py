@@ -130,8 +130,13 @@ class SceneCheck:
 
     def _frame_files(self, frame: int) -> list[Path]:
         kinds = [RENDER_PASSES[name] for name in self.recipe.passes]
-        kinds += [kind for kind in TARGETS if KINDS[kind].per_eye]
-        return [self.layout.file(kind, self.split, self.scene, eye, frame) for kind in kinds for eye in EYES]
+        kinds += [kind for kind in (*TARGETS, *self.recipe.targets) if KINDS[kind].per_eye]
+        return [
+            self.layout.file(kind, self.split, self.scene, eye, frame, direction)
+            for kind in kinds
+            for eye in EYES
+            for direction in KINDS[kind].directions
+        ]
 
     def _check_frame(self, scene: Scene, caster: SceneRayCaster | None, frame: int) -> None:
         samples = tuple(

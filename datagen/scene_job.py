@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -10,10 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from datagen.formats import write_camera_data, write_gradient, write_occlusion, write_pfm, write_png
+from datagen.formats import (
+    write_camera_data,
+    write_flow,
+    write_gradient,
+    write_mask,
+    write_normals,
+    write_occlusion,
+    write_pfm,
+    write_png,
+)
 from datagen.frames import BLENDER_LOG, EyeTargets, RenderOptions, Stopwatch, render_frames
 from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME
-from datagen.layout import EYES, FIRST_FRAME, Eye, Layout
+from datagen.layout import FIRST_FRAME, RENDER_PASSES, Direction, Eye, Layout
 from datagen.manifest import SceneManifest, file_entry, write_manifest
 from datagen.recipe import Recipe
 from scenes import Scene, scene_to_json
@@ -60,7 +70,10 @@ def _render_staged(job: SceneJob, watch: Stopwatch) -> SceneManifest:
     staged = Layout(job.staging)
     with watch.step("sample"):
         scene = job.recipe.sample(job.split, job.scene)
-    options = RenderOptions(job.recipe.samples, job.device, job.threads, job.recipe.gradient_threshold_px)
+    recipe = job.recipe
+    options = RenderOptions(
+        recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets
+    )
     statistics = []
     for frame, targets in render_frames(scene, job.staging, options, watch):
         with watch.step("write"):
@@ -73,15 +86,27 @@ def _render_staged(job: SceneJob, watch: Stopwatch) -> SceneManifest:
     return _commit(job, watch, _scene_statistics(scene, statistics))
 
 
-def _write_eye(layout: Layout, job: SceneJob, eye: Eye, number: int, arrays: EyeTargets) -> None:
-    def path(kind: str) -> Path:
-        return layout.file(kind, job.split, job.scene, eye, number)
+_EXTRA_WRITERS: dict[str, Callable[[Path, Any], None]] = {
+    "material_index": write_png,
+    "normals": write_normals,
+    "optical_flow": write_flow,
+    "disparity_change": write_pfm,
+    "motion_boundaries": write_mask,
+}
 
-    write_png(path("frames_cleanpass"), arrays.image)
+
+def _write_eye(layout: Layout, job: SceneJob, eye: Eye, number: int, arrays: EyeTargets) -> None:
+    def path(kind: str, direction: Direction | None = None) -> Path:
+        return layout.file(kind, job.split, job.scene, eye, number, direction)
+
+    for name, image in arrays.images.items():
+        write_png(path(RENDER_PASSES[name]), image)
     write_pfm(path("disparity"), arrays.disparity)
     write_gradient(path("disparity_gradient"), arrays.gradient, arrays.gradient_valid)
     write_occlusion(path("occlusion"), arrays.occlusion)
     write_png(path("object_index"), arrays.object_index)
+    for (kind, direction), values in arrays.extra.items():
+        _EXTRA_WRITERS[kind](path(kind, direction), values)
 
 
 def _write_scene_files(layout: Layout, job: SceneJob, scene: Scene) -> None:
@@ -102,7 +127,7 @@ def _frame_statistics(left: EyeTargets) -> dict[str, float]:
         "occluded_share": float((left.occlusion == OCCLUDED).mean()),
         "out_of_frame_share": float((left.occlusion == OUT_OF_FRAME).mean()),
         "gradient_valid_share": float(left.gradient_valid.mean()),
-        "mean_level": float(left.image.mean()),
+        "mean_level": float(next(iter(left.images.values())).mean()),
         "visible_objects": float(np.count_nonzero(np.unique(left.object_index))),
     }
 
@@ -132,7 +157,7 @@ def _commit(job: SceneJob, watch: Stopwatch, statistics: dict[str, Any]) -> Scen
             "numpy": np.__version__,
         },
     )
-    for source in sorted({_unit(path) for path in files}):
+    for source in sorted({_unit(path, job.staging) for path in files}):
         target = job.root / source.relative_to(job.staging)
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():  # Left by a run that was killed between moving and writing the manifest.
@@ -142,8 +167,7 @@ def _commit(job: SceneJob, watch: Stopwatch, statistics: dict[str, Any]) -> Scen
     return manifest
 
 
-def _unit(path: Path) -> Path:
+def _unit(path: Path, root: Path) -> Path:
     """What is moved as a whole for a staged file: a scene's folder, or the scene's single record."""
-    if path.parent.name in EYES:
-        return path.parent.parent
-    return path if path.suffix == ".json" else path.parent
+    kind, split, group, scene, *_ = path.relative_to(root).parts
+    return root / kind / split / group / scene

@@ -6,19 +6,28 @@ Every writer replaces its target in one step and gives the same bytes for the sa
 """
 
 from datagen.formats.camera_data import read_camera_data, write_camera_data
+from datagen.formats.flow import read_flow, write_flow
 from datagen.formats.gradient_exr import read_gradient, write_gradient
+from datagen.formats.normals_exr import read_normals, write_normals
 from datagen.formats.occlusion import read_occlusion, write_occlusion
 from datagen.formats.pfm import read_pfm, write_pfm
+from datagen.formats.pgm import read_mask, write_mask
 from datagen.formats.png import read_png, write_png
 
 __all__ = [
     "read_camera_data",
+    "read_flow",
     "read_gradient",
+    "read_mask",
+    "read_normals",
     "read_occlusion",
     "read_pfm",
     "read_png",
     "write_camera_data",
+    "write_flow",
     "write_gradient",
+    "write_mask",
+    "write_normals",
     "write_occlusion",
     "write_pfm",
     "write_png",

@@ -1,43 +1,14 @@
-"""Disparity gradients as OpenEXR: channels `dx`, `dy`, `valid` (0 or 1), float32 scan lines, ZIP compression.
-
-OpenEXR's reader takes a file at its word and allocates what the header declares, so the header and the table
-of chunks are checked here first against the exact layout that `write_gradient` makes
-(openexr.com/en/latest/OpenEXRFileLayout.html).
-"""
+"""Disparity gradients as OpenEXR: channels `dx`, `dy`, `valid` (0 or 1)."""
 
 from __future__ import annotations
 
-import struct
-import zlib
 from pathlib import Path
 
 import numpy as np
-import OpenEXR
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
-from datagen.formats.limits import check_image_size, read_bounded
-from storage import replacing
-
-_CHANNELS = ("dx", "dy", "valid")
-_MAGIC_AND_VERSION = struct.pack("<II", 20000630, 2)
-"""Version 2 with no flag set: one part, scan lines, short names, no deep data."""
-_ZIP = 3
-_LINES_PER_CHUNK = 16
-_FLOAT = 2
-_INCREASING_Y = 0
-_ATTRIBUTE_TYPES = {
-    "channels": "chlist",
-    "compression": "compression",
-    "dataWindow": "box2i",
-    "displayWindow": "box2i",
-    "lineOrder": "lineOrder",
-    "pixelAspectRatio": "float",
-    "screenWindowCenter": "v2f",
-    "screenWindowWidth": "float",
-    "type": "string",
-}
-"""All that such a file needs; OpenEXR prints warnings about others that we could not turn into an error."""
+from datagen.formats.exr import read_channels, write_channels
 
 
 def read_gradient(path: Path | str) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -45,19 +16,11 @@ def read_gradient(path: Path | str) -> tuple[NDArray[np.float32], NDArray[np.boo
 
     Raises FormatError.
     """
-    path = Path(path)
-    data = read_bounded(path)
-    width, height = _check_layout(path, data)
-    try:
-        with OpenEXR.File(str(path), separate_channels=True, num_threads=0) as file:
-            dx, dy, valid = (np.array(file.channels()[name].pixels) for name in _CHANNELS)
-    except (RuntimeError, ValueError, TypeError, KeyError) as error:
-        raise FormatError(f"{path}: is a damaged EXR file: {' '.join(str(error).split())}") from error
-    if any(channel.shape != (height, width) or channel.dtype != np.float32 for channel in (dx, dy, valid)):
-        raise FormatError(f"{path}: its channels do not have the size its header declares")
+    planes = read_channels(Path(path), ("dx", "dy", "valid"))
+    valid = planes["valid"]
     if not np.isin(valid, (0, 1)).all():
         raise FormatError(f"{path}: its channel 'valid' has values other than 0 and 1")
-    return np.stack([dx, dy], axis=-1), valid == 1
+    return np.stack([planes["dx"], planes["dy"]], axis=-1), valid == 1
 
 
 def write_gradient(path: Path | str, gradient: NDArray[np.float32], valid: NDArray[np.bool_]) -> None:
@@ -68,92 +31,4 @@ def write_gradient(path: Path | str, gradient: NDArray[np.float32], valid: NDArr
             f"{path}: a gradient is (H, W, 2) numbers with an (H, W) mask, "
             f"not {gradient.shape} with {valid.shape}"
         )
-    planes = (gradient[..., 0], gradient[..., 1], valid)
-    channels = {
-        name: np.ascontiguousarray(plane, np.float32) for name, plane in zip(_CHANNELS, planes, strict=True)
-    }
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    with replacing(path) as temporary:
-        OpenEXR.File(header, channels, num_threads=0).write(str(temporary))
-
-
-def _check_layout(path: Path, data: bytes) -> tuple[int, int]:
-    """Check all that is not pixels; return (width, height)."""
-    if not data.startswith(_MAGIC_AND_VERSION):
-        raise FormatError(f"{path}: is not an EXR file of one part of scan lines")
-    try:
-        attributes, table = _parse_attributes(data)
-        _check_channels(path, attributes["channels"])
-        x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"])
-        encoding = (attributes["compression"], attributes["lineOrder"])
-    except (KeyError, ValueError, struct.error) as error:
-        raise FormatError(f"{path}: is an EXR file whose header does not parse ({error})") from error
-    if encoding != (bytes([_ZIP]), bytes([_INCREASING_Y])):
-        raise FormatError(f"{path}: is not an EXR file of ZIP-compressed lines from the top down")
-    width, height = x1 - x0 + 1, y1 - y0 + 1
-    check_image_size(path, width, height, len(_CHANNELS))
-    _check_chunks(path, data, table, width, y0, height)
-    return width, height
-
-
-def _parse_attributes(data: bytes) -> tuple[dict[str, bytes], int]:
-    """The header's attributes by name, and where the table of chunks begins. ValueError says what is odd."""
-    attributes: dict[str, bytes] = {}
-    position = len(_MAGIC_AND_VERSION)
-    while data[position : position + 1] != b"\0":
-        name_end = data.index(b"\0", position, position + 32)
-        type_end = data.index(b"\0", name_end + 1, name_end + 33)
-        (size,) = struct.unpack_from("<I", data, type_end + 1)
-        end = type_end + 5 + size
-        name, kind = data[position:name_end].decode("ascii"), data[name_end + 1 : type_end].decode("ascii")
-        if _ATTRIBUTE_TYPES.get(name) != kind or name in attributes or end >= len(data):
-            raise ValueError(f"attribute {name!r} is unknown, repeated or too long")
-        attributes[name] = data[type_end + 5 : end]
-        position = end
-    return attributes, position + 1
-
-
-def _check_channels(path: Path, channel_list: bytes) -> None:
-    """Require exactly our three channels, all float32 at full resolution."""
-    expected = b"".join(
-        name.encode("ascii") + b"\0" + struct.pack("<iB3xii", _FLOAT, 0, 1, 1) for name in _CHANNELS
-    )
-    if channel_list != expected + b"\0":
-        raise FormatError(f"{path}: is not an EXR file of the float channels {', '.join(_CHANNELS)}")
-
-
-def _check_chunks(path: Path, data: bytes, table: int, width: int, top: int, height: int) -> None:
-    """Require the chunks to lie in the file one after the other, and to end where the file ends."""
-    count = -(-height // _LINES_PER_CHUNK)
-    position = table + 8 * count
-    if position > len(data):
-        raise FormatError(f"{path}: is an EXR file cut off after {len(data)} bytes")
-    for index, offset in enumerate(struct.unpack_from(f"<{count}Q", data, table)):
-        lines = min(_LINES_PER_CHUNK, height - index * _LINES_PER_CHUNK)
-        if offset != position or position + 8 > len(data):
-            raise FormatError(
-                f"{path}: is an EXR file whose chunk {index} of {count} is not where it should be"
-            )
-        line, size = struct.unpack_from("<ii", data, position)
-        raw_size = lines * width * 4 * len(_CHANNELS)
-        if line != top + index * _LINES_PER_CHUNK or not 0 < size <= raw_size:
-            raise FormatError(f"{path}: is an EXR file whose chunk {index} of {count} has a damaged head")
-        position += 8 + size
-        if size < raw_size and not _inflates(data[position - size : position], raw_size):
-            raise FormatError(f"{path}: is an EXR file whose chunk {index} of {count} does not decompress")
-    if position != len(data):
-        raise FormatError(f"{path}: has {len(data)} bytes where its chunks end at {position}")
-
-
-def _inflates(packed: bytes, raw_size: int) -> bool:
-    """Whether a chunk is one zlib stream of the right size and checksum.
-
-    OpenEXR would print a warning and give no pixels. A chunk that is not smaller packed is stored as it is.
-    """
-    stream = zlib.decompressobj()
-    try:
-        # One byte more than there should be, so that the stream's checksum is read too.
-        raw = stream.decompress(packed, raw_size + 1)
-    except zlib.error:
-        return False
-    return len(raw) == raw_size and stream.eof
+    write_channels(path, {"dx": gradient[..., 0], "dy": gradient[..., 1], "valid": valid})

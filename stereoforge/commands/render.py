@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dataset
+from datagen.layout import EXTRA_TARGETS
 from datagen.manifest import SceneManifest
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
@@ -42,6 +43,9 @@ class Render:
     """Paths a pixel for the pictures, denoised; ground truth is exact whatever this is."""
     passes: Annotated[str | None, shown("LIST", "clean")] = None
     """Render passes, comma-separated."""
+    targets: Annotated[str | None, shown("all|LIST", "none")] = None
+    """Targets besides disparity, gradient, occlusion and object index, comma-separated: material_index,
+    normals, optical_flow, disparity_change, motion_boundaries."""
     device: Literal["cpu", "cuda", "optix", "hip", "metal"] = "cpu"
     """What Cycles computes on."""
     workers: Annotated[int | None, shown("N", "one a core")] = None
@@ -98,6 +102,8 @@ class Render:
             changes["scenes"] = {split: DEFAULT_SCENES if self.scenes is None else self.scenes}
         if self.passes is not None:
             changes["passes"] = tuple(self.passes.split(","))
+        if self.targets is not None:
+            changes["targets"] = EXTRA_TARGETS if self.targets == "all" else tuple(self.targets.split(","))
         changes |= {key: getattr(self, key) for key in ("seed", "samples") if getattr(self, key) is not None}
         try:
             return replace(base, **changes)

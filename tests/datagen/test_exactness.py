@@ -93,12 +93,12 @@ def warp_error(world: World, shift_px: float = 0.0, sign: float = -1.0) -> NDArr
     where = [rows, columns + sign * left.disparity + shift_px]
     warped = np.stack(
         [
-            map_coordinates(right.image[..., c].astype(float), where, order=1, mode="nearest")
+            map_coordinates(right.images["clean"][..., c].astype(float), where, order=1, mode="nearest")
             for c in range(3)
         ],
         -1,
     )
-    return ((warped - left.image) ** 2).mean(axis=-1)
+    return ((warped - left.images["clean"]) ** 2).mean(axis=-1)
 
 
 def psnr(squared_errors: list[NDArray[np.float64]]) -> float:

@@ -15,10 +15,14 @@ import pytest
 from datagen.errors import DatasetError
 from datagen.formats import (
     read_camera_data,
+    read_flow,
+    read_mask,
     read_occlusion,
     read_pfm,
     read_png,
     write_camera_data,
+    write_flow,
+    write_mask,
     write_occlusion,
     write_pfm,
     write_png,
@@ -35,6 +39,8 @@ WRITERS: dict[str, tuple[Callable[[Path], None], Callable[[Path], Any]]] = {
         lambda path: write_occlusion(path, RNG.integers(0, 3, (20, 30), dtype=np.uint8)),
         read_occlusion,
     ),
+    "flow": (lambda path: write_flow(path, RNG.normal(size=(9, 7, 2)).astype(np.float32)), read_flow),
+    "mask": (lambda path: write_mask(path, RNG.random((20, 30)) < 0.5), read_mask),
     "camera data": (
         lambda path: write_camera_data(path, {k: (np.eye(4), RNG.normal(size=(4, 4))) for k in (6, 7)}),
         read_camera_data,

@@ -28,6 +28,24 @@ LAYOUT = Layout(Path("/data"))
         (LAYOUT.file("occlusion", "train", 10000, "left", 6), "occlusion/TRAIN/A/10000/left/0006.png"),
         (LAYOUT.file("object_index", "train", 1, "left", 6), "object_index/TRAIN/A/0001/left/0006.png"),
         (LAYOUT.file("camera_data", "train", 1), "camera_data/TRAIN/A/0001/camera_data.txt"),
+        (
+            LAYOUT.file("optical_flow", "train", 2, "left", 6, "into_future"),
+            "optical_flow/TRAIN/A/0002/into_future/left/OpticalFlowIntoFuture_0006_L.pfm",
+        ),
+        (
+            LAYOUT.file("optical_flow", "test", 2, "right", 15, "into_past"),
+            "optical_flow/TEST/A/0002/into_past/right/OpticalFlowIntoPast_0015_R.pfm",
+        ),
+        (
+            LAYOUT.file("disparity_change", "train", 2, "right", 7, "into_past"),
+            "disparity_change/TRAIN/A/0002/into_past/right/0007.pfm",
+        ),
+        (
+            LAYOUT.file("motion_boundaries", "train", 2, "left", 7, "into_future"),
+            "motion_boundaries/TRAIN/A/0002/into_future/left/0007.pgm",
+        ),
+        (LAYOUT.file("material_index", "val", 2, "left", 7), "material_index/VAL/A/0002/left/0007.png"),
+        (LAYOUT.file("normals", "val", 2, "left", 7), "normals/VAL/A/0002/left/0007.exr"),
         (LAYOUT.scene_record("train", 123456), "scenes/TRAIN/A/123456.json"),
         (LAYOUT.manifest("val", 7), "manifest/VAL/A/0007.json"),
         (LAYOUT.recipe, "recipe.yaml"),
@@ -46,7 +64,11 @@ def test_no_two_files_share_a_path() -> None:
             for name, kind in KINDS.items():
                 if kind.per_eye:
                     eyes_and_frames = [(eye, frame) for eye in ("left", "right") for frame in (6, 7)]
-                    paths += [LAYOUT.file(name, split, scene, *one) for one in eyes_and_frames]
+                    paths += [
+                        LAYOUT.file(name, split, scene, *one, direction)
+                        for one in eyes_and_frames
+                        for direction in kind.directions
+                    ]
                 else:
                     paths.append(LAYOUT.file(name, split, scene))
     assert len(set(paths)) == len(paths)
@@ -79,3 +101,10 @@ def test_committed_scenes_are_those_with_a_manifest(tmp_path: Path) -> None:
     layout.scene_folder("disparity", "train", 4).mkdir(parents=True)
     assert layout.committed_scenes("train") == [2, 10, 12345]
     assert layout.committed_scenes("test") == []
+
+
+def test_only_kinds_over_time_have_a_direction() -> None:
+    with pytest.raises(ValueError, match="no direction None"):
+        LAYOUT.file("optical_flow", "train", 0, "left", 6)
+    with pytest.raises(ValueError, match="no direction 'into_past'"):
+        LAYOUT.file("disparity", "train", 0, "left", 6, "into_past")

@@ -1,0 +1,298 @@
+"""Optical flow, disparity change, motion boundaries and normals against closed forms and rendered pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+from scipy.spatial.transform import Rotation
+
+from datagen import DatasetError, Recipe, StereoDataset, StereoSample, render_dataset
+from datagen.layout import DIRECTIONS, EXTRA_TARGETS, EYES, Direction, Eye
+from datagen.raycast import SceneRayCaster
+from datagen.scene_geometry import SceneGeometry
+from datagen.surface_targets import STEP, PixelSurfaces
+from datagen.verify import verify_dataset
+from scenes import FAMILIES, Scene
+from scenes.motion import quaternion
+from scenes.shapes.basic import Plane
+from scenes.spec import Deformation, Material, SceneObject, StereoCamera, Trajectory
+from scenes.textures.plain import SolidColor
+from tests.datagen.worlds import plates
+
+WIDTH, HEIGHT = 96, 64
+FOCAL_PX, BASELINE_M = 96.0, 0.4
+NOW = 1
+"""The frame looked at, so that there is a past."""
+TOLERANCE_PX = 1e-2
+
+
+@dataclass(frozen=True)
+class Stretch(Deformation):
+    """An affine change of shape, growing with time: a plane stays a plane, so there is a closed form."""
+
+    matrix: tuple[tuple[float, float, float], ...]
+
+    def deformed(self, vertices: NDArray[np.float64], time_frames: float) -> NDArray[np.float64]:
+        return vertices + time_frames * vertices @ np.array(self.matrix).T
+
+
+STRETCH = ((0.05, 0.02, 0.0), (-0.03, 0.04, 0.0), (0.06, -0.05, 0.0))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """x(t) = position + t velocity, R(t) = exp(t turn) start; keys at t = 0 and t = 2 make it exactly so."""
+
+    position: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+    turn: tuple[float, float, float]
+    start: Rotation
+
+    def trajectory(self) -> Trajectory:
+        poses = [self.at(time) for time in (0.0, 2.0)]
+        return Trajectory(
+            (0.0, 2.0),
+            tuple(tuple(float(v) for v in position) for _, position in poses),
+            tuple(quaternion(Rotation.from_matrix(matrix)) for matrix, _ in poses),
+        )
+
+    def at(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        position = np.array(self.position) + time * np.array(self.velocity)
+        return (Rotation.from_rotvec(time * np.array(self.turn)) * self.start).as_matrix(), position
+
+
+RIG = Motion((0.3, -0.2, 0.5), (0.2, 0.1, -0.3), (0.02, -0.03, 0.04), Rotation.from_euler("xyz", (0.1, 0, 0)))
+PLANE = Motion(
+    (0.0, 0.0, -6.0), (-0.3, 0.2, 0.4), (0.05, 0.1, -0.15), Rotation.from_euler("xyz", (0.4, -0.3, 0.2))
+)
+PLANE_HALF_M = 3.0
+KINDS = {"rigid": np.zeros((3, 3)), "deforming": np.array(STRETCH)}
+
+
+def moving_plane(stretch: NDArray[np.float64]) -> Scene:
+    deformation = Stretch(tuple(map(tuple, stretch))) if stretch.any() else None
+    thing = SceneObject(
+        "plane", Plane(), 0, PLANE.trajectory(), (PLANE_HALF_M, PLANE_HALF_M, 1.0), deformation
+    )
+    camera = StereoCamera(WIDTH, HEIGHT, 32.0, BASELINE_M, RIG.trajectory())
+    scene = plates(WIDTH, HEIGHT)
+    return replace(
+        scene, frames=3, camera=camera, objects=(thing,), materials=(Material(SolidColor((90, 90, 90))),)
+    )
+
+
+@dataclass(frozen=True)
+class Expected:
+    hit: NDArray[np.bool_]
+    flow: NDArray[np.float64]
+    disparity_change: NDArray[np.float64]
+    normal: NDArray[np.float64]
+
+
+def closed_form(stretch: NDArray[np.float64], eye: Eye, step: float, centre: float = 0.5) -> Expected:
+    """Where the plane's points and the sky go from frame `NOW` on, from the motions' own formulas."""
+    columns, rows = np.meshgrid(np.arange(WIDTH) + centre, np.arange(HEIGHT) + centre)
+    rays = np.stack(
+        [(columns - WIDTH / 2) / FOCAL_PX, (HEIGHT / 2 - rows) / FOCAL_PX, -np.ones_like(rows)], -1
+    )
+    spans, middle = plane_seen(stretch, eye, NOW)
+    # The ray meets middle + u spans_x + v spans_y: three linear equations in (depth, u, v).
+    system = np.concatenate([rays[..., None], np.broadcast_to(-spans, (*rays.shape[:2], 3, 2))], -1)
+    depth, u, v = np.moveaxis(
+        np.linalg.solve(system, np.broadcast_to(middle, rays.shape)[..., None])[..., 0], -1, 0
+    )
+    hit = (np.abs(u) <= 1) & (np.abs(v) <= 1) & (depth > 0)
+    spans_then, middle_then = plane_seen(stretch, eye, NOW + step)
+    there = middle_then + np.stack([u, v], -1) @ spans_then.T
+    camera_now, camera_then = RIG.at(NOW)[0], RIG.at(NOW + step)[0]
+    there = np.where(hit[..., None], there, rays @ camera_now.T @ camera_then)
+    x = WIDTH / 2 + FOCAL_PX * there[..., 0] / -there[..., 2]
+    y = HEIGHT / 2 - FOCAL_PX * there[..., 1] / -there[..., 2]
+    change = np.where(hit, FOCAL_PX * BASELINE_M * (1 / -there[..., 2] - 1 / depth), 0.0)
+    normal = np.cross(spans[:, 0], spans[:, 1])
+    normal *= -np.sign(normal @ middle) / np.linalg.norm(normal)
+    return Expected(hit, np.stack([x - columns, y - rows], -1), change, normal)
+
+
+def plane_seen(
+    stretch: NDArray[np.float64], eye: Eye, time: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """In the eye's frame: (3, 2) images of the plane's half axes, and its centre."""
+    turn, position = PLANE.at(time)
+    axes = turn @ np.diag((PLANE_HALF_M, PLANE_HALF_M, 1.0)) @ (np.eye(3) + time * stretch)[:, :2]
+    camera, place = RIG.at(time)
+    place = place + (BASELINE_M * camera[:, 0] if eye == "right" else 0.0)
+    return camera.T @ axes, camera.T @ (position - place)
+
+
+def surfaces(scene: Scene, eye: Eye, time: float = NOW) -> PixelSurfaces:
+    geometry = SceneGeometry(scene)
+    return PixelSurfaces(SceneRayCaster(geometry), geometry, eye, time)
+
+
+@pytest.mark.parametrize("direction", DIRECTIONS)
+@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_flow_disparity_change_and_normals_have_their_closed_form(
+    kind: str, eye: Eye, direction: Direction
+) -> None:
+    stretch = KINDS[kind]
+    found, expected = surfaces(moving_plane(stretch), eye), closed_form(stretch, eye, STEP[direction])
+    assert 0.3 < expected.hit.mean() < 0.95
+    # Pixels on the plane's rim may fall to either side.
+    rim = np.zeros_like(expected.hit)
+    for axis in (0, 1):
+        rim |= (np.diff(expected.hit, axis=axis, append=0) != 0) | (
+            np.diff(expected.hit, axis=axis, prepend=0) != 0
+        )
+    flow = found.flow(direction)
+    error = np.linalg.norm(flow - expected.flow, axis=-1)[~rim]
+    print(f"{kind} {eye} {direction}: flow p99.9 {np.percentile(error, 99.9):.2e}, max {error.max():.2e} px")
+    assert np.percentile(error, 99.9) < TOLERANCE_PX
+    assert np.abs(found.disparity_change(direction) - expected.disparity_change)[~rim].max() < TOLERANCE_PX
+    normals = found.normals()[expected.hit & ~rim]
+    assert np.abs(normals - expected.normal).max() < 1e-5
+    # What would be wrong: half a pixel, the sign, the direction, the other eye, a forgotten deformation.
+    other_eye: Eye = "right" if eye == "left" else "left"
+    wrong = {
+        "half a pixel": closed_form(stretch, eye, STEP[direction], centre=0.0).flow,
+        "sign": -expected.flow,
+        "direction": closed_form(stretch, eye, -STEP[direction]).flow,
+        "eye": closed_form(stretch, other_eye, STEP[direction]).flow,
+        "shape": closed_form(0.5 * stretch + 0.01, eye, STEP[direction]).flow,
+    }
+    for name, other in wrong.items():
+        assert np.percentile(np.linalg.norm(flow - other, axis=-1)[~rim], 50) > TOLERANCE_PX, name
+
+
+def test_points_that_go_behind_the_camera_have_no_flow() -> None:
+    scene = moving_plane(np.zeros((3, 3)))
+    path = Trajectory((0.0, 2.0), ((0.0, 0.0, -2.0), (0.0, 0.0, 9.0)), ((1.0, 0.0, 0.0, 0.0),) * 2)
+    camera = replace(scene.camera, motion=Trajectory.static())
+    scene = replace(scene, camera=camera, objects=(replace(scene.objects[0], motion=path),))
+    found = surfaces(scene, "left", 0.0)
+    assert np.isnan(found.flow("into_future")).all()
+    assert np.isnan(found.disparity_change("into_future")).all()
+    assert np.isfinite(found.flow("into_past")).all()
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two frames of one small world with every target."""
+    root = tmp_path_factory.mktemp("targets") / "set"
+    world = FAMILIES["flying_things"].config(
+        width=160,
+        height=96,
+        frames=2,
+        background_objects=(10, 10),
+        flying_objects=(6, 6),
+        camera_speed=(0.02, 0.03),
+        flying_speed=(0.02, 0.03),
+    )
+    recipe = Recipe(world, {"train": 1}, seed=3, samples=4, targets=EXTRA_TARGETS)
+    assert render_dataset(recipe, root, workers=1).failures == ()
+    return root
+
+
+def warp_errors(
+    here: StereoSample, there: StereoSample, flow: NDArray[np.float32], eye: Eye
+) -> NDArray[np.float64]:
+    """(H, W) mean squared difference, levels^2, of one picture and the other one fetched along the flow."""
+    rows, columns = np.indices(here.size)
+    where = [rows + flow[..., 1], columns + flow[..., 0]]
+    picture = there.view(eye).image
+    fetched = [
+        map_coordinates(picture[..., c].astype(float), where, order=1, mode="nearest") for c in range(3)
+    ]
+    return ((np.stack(fetched, -1) - here.view(eye).image) ** 2).mean(axis=-1)
+
+
+def psnr(errors: NDArray[np.float64]) -> float:
+    return float(10 * np.log10(255**2 / errors.mean()))
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_warping_the_next_frame_by_the_flow_gives_this_one_where_it_is_visible(
+    dataset: Path, eye: Eye
+) -> None:
+    first, second = StereoDataset(dataset, "train")
+    for here, there, direction in ((first, second, "into_future"), (second, first, "into_past")):
+        flow = here.flow(eye, direction)
+        height, width = here.size
+        rows, columns = np.indices(here.size)
+        x, y = columns + flow[..., 0], rows + flow[..., 1]
+        inside = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
+        # Visible: the disparity that the point will have is found where the point will be.
+        expected = here.view(eye).disparity + here.disparity_change(eye, direction)
+        around = np.stack(
+            [
+                there.view(eye).disparity[
+                    np.clip(np.floor(y).astype(int) + i, 0, height - 1),
+                    np.clip(np.floor(x).astype(int) + j, 0, width - 1),
+                ]
+                for i in (0, 1)
+                for j in (0, 1)
+            ]
+        )
+        low, high = around.min(axis=0), around.max(axis=0)
+        visible = inside & (high - low < 0.5) & (expected > low - 0.02) & (expected < high + 0.02)
+        hidden = inside & (low > expected + 0.5)
+        errors = warp_errors(here, there, flow, eye)
+        turned = warp_errors(here, there, -flow, eye)
+        print(
+            f"{eye} {direction}: visible {visible.mean():.1%} {psnr(errors[visible]):.1f} dB, hidden "
+            f"{hidden.mean():.1%} {psnr(errors[hidden]):.1f} dB, sign turned {psnr(turned[visible]):.1f} dB"
+        )
+        assert visible.mean() > 0.5
+        assert psnr(errors[visible]) > 25
+        assert psnr(errors[hidden]) < psnr(errors[visible]) - 6
+        assert psnr(turned[visible]) < psnr(errors[visible]) - 3
+
+
+def test_all_targets_are_there_and_agree_among_themselves(dataset: Path) -> None:
+    assert verify_dataset(dataset, workers=1).problems == ()
+    for sample in StereoDataset(dataset, "train"):
+        materials = np.array([0, *(1 + thing.material for thing in sample.scene_record.objects)])
+        for eye in EYES:
+            view = sample.view(eye)
+            assert np.array_equal(sample.material_index(eye), materials[view.object_index])
+            length = np.linalg.norm(sample.normals(eye), axis=-1)
+            assert np.allclose(length[view.object_index > 0], 1, atol=1e-5)
+            assert (length[view.object_index == 0] == 0).mean() > 0.99
+            for direction in DIRECTIONS:
+                flow, marked = sample.flow(eye, direction), sample.motion_boundaries(eye, direction)
+                assert 0 < marked.mean() < 0.3
+                # Inside one object the flow is smooth; marked pixels touch another object.
+                index = np.pad(view.object_index.astype(int), 1, mode="edge")
+                touching = np.zeros(sample.size, bool)
+                for rows, columns in ((0, 1), (2, 1), (1, 0), (1, 2)):
+                    shifted = index[rows : rows + sample.size[0], columns : columns + sample.size[1]]
+                    touching |= shifted != view.object_index
+                assert (touching[marked]).mean() > 0.99
+                assert np.isfinite(flow).all()
+
+
+def test_flow_loaders_find_the_published_names(dataset: Path) -> None:
+    """The globs of torchvision's FlyingThings3D and RAFT's loader: as many flows as pictures, in order."""
+    for direction, towards in (("into_future", "IntoFuture"), ("into_past", "IntoPast")):
+        for eye in EYES:
+            folder = dataset / "optical_flow/TRAIN/A/0000" / direction / eye
+            names = sorted(path.name for path in folder.glob("*.pfm"))
+            assert names == [f"OpticalFlow{towards}_{k:04d}_{eye[0].upper()}.pfm" for k in (6, 7)]
+            first = (folder / names[0]).read_bytes()
+            assert first.startswith(b"PF\n160 96\n-1.0\n")
+            values = np.frombuffer(first[-4 * 3 * 160 * 96 :], "<f4").reshape(96, 160, 3)[::-1]
+            sample = StereoDataset(dataset, "train")[0]
+            assert np.array_equal(values[..., :2], sample.flow(eye, direction))
+            assert not values[..., 2].any()
+
+
+def test_unknown_targets_are_refused() -> None:
+    world = FAMILIES["flying_things"].config()
+    with pytest.raises(DatasetError, match=r"targets must be among material_index.*'albedo'"):
+        Recipe(world, {"train": 1}, targets=("albedo",))
