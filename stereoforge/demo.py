@@ -70,7 +70,7 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
         evaluation = evaluate_datasets([test], open_predictors(weights))
     minutes = (time.monotonic() - started) / 60
     files = report_evaluation(
-        evaluation, [test], weights, out / "report", _limits(plan, minutes), "StereoForge demo"
+        evaluation, [f"{data} (test)"], weights, out / "report", _limits(plan, minutes), "StereoForge demo"
     )
     return DemoResult(data, weights, gallery, files.html, evaluation, minutes)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from datagen import StereoDataset
+from datagen.frame import StereoFrame
 from refine.evaluation import Evaluation, evaluate
 from refine.methods import Method
 from refine.report import ReportContext, ReportFiles, write_report
@@ -14,14 +14,13 @@ from stereoforge.progress import progress_bar
 
 
 def evaluate_datasets(
-    datasets: Sequence[StereoDataset], predictors: Predictors, methods: tuple[Method, ...] = ()
+    datasets: Sequence[Sequence[StereoFrame]], predictors: Predictors, methods: tuple[Method, ...] = ()
 ) -> Evaluation:
     """Run the networks and every method on every frame, showing progress."""
-    samples = [sample for dataset in datasets for sample in dataset]
     with progress_bar() as progress:
-        task = progress.add_task("evaluating", total=len(samples))
+        task = progress.add_task("evaluating", total=sum(map(len, datasets)))
         return evaluate(
-            (predictors.frame(sample) for sample in samples),
+            (predictors.frame(sample) for dataset in datasets for sample in dataset),
             methods,
             progress=lambda done, _: progress.update(task, completed=done),
         )
@@ -29,20 +28,23 @@ def evaluate_datasets(
 
 def report_evaluation(
     evaluation: Evaluation,
-    datasets: Sequence[StereoDataset],
+    sources: Sequence[str],
     weights: Path,
     out: Path,
     limits: tuple[str, ...] = (),
     title: str = "StereoForge evaluation",
 ) -> ReportFiles:
-    """Write the report, saying what was evaluated with what."""
+    """Write the report, saying what was evaluated with what.
+
+    sources: the data sets' names, with their splits.
+    """
     return write_report(
         evaluation,
         out,
         ReportContext(
             title=title,
             facts={
-                "Data": ", ".join(f"{dataset.layout.root} ({dataset.split})" for dataset in datasets),
+                "Data": ", ".join(sources),
                 "Frames": str(len(evaluation.frames)),
                 "Weights": "; ".join(_describe_networks(weights)),
             },

@@ -6,7 +6,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from datagen import StereoSample
+import numpy as np
+
+from datagen.frame import StereoFrame
 from refine.evaluation import EvaluationFrame
 from refine.settings import FILE_NAME, Settings, read_settings
 from training.predict import StereoPredictor
@@ -21,8 +23,12 @@ class Predictors:
     fine_tuned: StereoPredictor | None
     """The regressor fine-tuned on gradients, where there is one."""
 
-    def frame(self, sample: StereoSample) -> EvaluationFrame:
-        """One sample with all that is predicted for it, and how long that took."""
+    def frame(self, sample: StereoFrame) -> EvaluationFrame:
+        """One sample with all that is predicted for it, and how long that took.
+
+        Where nobody knows what is occluded, nothing is taken to be.
+        """
+        occlusion = sample.occlusion_left
         began = time.perf_counter()
         prediction = self.networks.predict(sample.left, sample.right)
         seconds = {"disparity": time.perf_counter() - began}
@@ -35,7 +41,7 @@ class Predictors:
             name=sample.name,
             image=sample.left,
             truth=sample.disparity_left,
-            occlusion=sample.occlusion_left,
+            occlusion=np.zeros(sample.size, np.uint8) if occlusion is None else occlusion,
             disparity=prediction.disparity,
             confidence=prediction.confidence,
             gradient=prediction.gradient,

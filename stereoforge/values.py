@@ -34,18 +34,19 @@ def parse_shard(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def parse_weighted_folder(text: str) -> tuple[Path, float]:
-    """(folder, weight) of "folder" (weight 1) or "folder:2.5"; a folder that has such a name wins."""
-    if Path(text).exists() or ":" not in text:
-        return Path(text), 1.0
-    folder, _, number = text.rpartition(":")
+def parse_weighted_source(text: str) -> tuple[str, float]:
+    """(source, weight) of "source" (weight 1) or "source:2.5"; a folder that has such a name wins."""
+    source, _, number = text.rpartition(":")
+    # The port of http://host:8080 is no weight.
+    if Path(text).exists() or not source or re.fullmatch(r"\w+://[^/]*", source):
+        return text, 1.0
     try:
         weight = float(number)
     except ValueError:
-        return Path(text), 1.0
+        return text, 1.0
     if not 0 < weight < float("inf"):
         raise UsageError(f"--data {text}: the weight must be positive, got {number}")
-    return Path(folder), weight
+    return source, weight
 
 
 def parse_methods(text: str) -> tuple[str, ...]:

@@ -28,11 +28,13 @@ class StereoPair:
     right: NDArray[np.uint8]
     disparity_left: Float32
     """(H, W) px, NaN invalid."""
-    disparity_right: Float32
+    disparity_right: Float32 | None
+    """None where the data set has none; such a pair cannot be mirrored."""
 
     @property
     def nbytes(self) -> int:
-        return self.left.nbytes + self.right.nbytes + self.disparity_left.nbytes + self.disparity_right.nbytes
+        right = 0 if self.disparity_right is None else self.disparity_right.nbytes
+        return self.left.nbytes + self.right.nbytes + self.disparity_left.nbytes + right
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,8 @@ class AugmentationConfig:
     log_squeeze: tuple[float, float] = (-0.3, 0.3)
     """q: horizontal zoom times q, vertical zoom divided by q."""
     horizontal_flip: float = 0.0
-    """Probability of mirroring, which swaps the views and takes the right view's truth."""
+    """Probability of mirroring, which swaps the views and takes the right view's truth. Pairs without that truth
+    stay as they are."""
     vertical_flip: float = 0.0
     """Probability of turning upside down."""
     log_brightness: float = 0.4
@@ -104,7 +107,7 @@ def augment(
     Raises:
         ValueError: the pair is smaller than `size`.
     """
-    if rng.random() < config.horizontal_flip:
+    if rng.random() < config.horizontal_flip and pair.disparity_right is not None:
         pair = mirror(pair)
     if rng.random() < config.vertical_flip:
         pair = turn_over(pair)
@@ -131,7 +134,12 @@ def _normal_table() -> Float32:
 
 
 def mirror(pair: StereoPair) -> StereoPair:
-    """Mirror left-right: the mirrored right view is the left view of a pair with positive disparity again."""
+    """Mirror left-right: the mirrored right view is the left view of a pair with positive disparity again.
+
+    Raises ValueError for a pair without the right view's truth.
+    """
+    if pair.disparity_right is None:
+        raise ValueError("a pair without the right view's disparity cannot be mirrored")
     return StereoPair(
         left=pair.right[:, ::-1],
         right=pair.left[:, ::-1],
@@ -142,9 +150,8 @@ def mirror(pair: StereoPair) -> StereoPair:
 
 def turn_over(pair: StereoPair) -> StereoPair:
     """Mirror top-bottom."""
-    return StereoPair(
-        pair.left[::-1], pair.right[::-1], pair.disparity_left[::-1], pair.disparity_right[::-1]
-    )
+    right = None if pair.disparity_right is None else pair.disparity_right[::-1]
+    return StereoPair(pair.left[::-1], pair.right[::-1], pair.disparity_left[::-1], right)
 
 
 def draw_window(

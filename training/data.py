@@ -10,7 +10,6 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import pytorch_lightning as pl
@@ -19,7 +18,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
-from datagen import StereoDataset
+from datagen.frame import StereoFrame
+from datagen.source import open_source
+from datagen.sources.webdataset import ShardFrames
 from training.augmentation import (
     IDENTITY_CURVE,
     StereoPair,
@@ -33,35 +34,21 @@ from training.presets import Preset
 
 DEFAULT_CACHE_BYTES = 2 << 30
 IMAGE_MEAN_FRAMES = 100
+SHARDS_TOGETHER = 8
 
 Batch = dict[str, Tensor]
 """`left`, `right` (B, 3, H, W) in 0..1, `disparity` (B, 1, H, W), `gradient` (B, 2, H, W), NaN invalid."""
-
-
-class Frame(Protocol):
-    """What training reads of a `datagen.StereoSample`."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def left(self) -> NDArray[np.uint8]: ...
-    @property
-    def right(self) -> NDArray[np.uint8]: ...
-    @property
-    def disparity_left(self) -> NDArray[np.float32]: ...
-    @property
-    def disparity_right(self) -> NDArray[np.float32]: ...
 
 
 @dataclass(frozen=True)
 class Source:
     """A data set and how often it is drawn from, relative to the others."""
 
-    frames: Sequence[Frame]
+    frames: Sequence[StereoFrame]
     weight: float = 1.0
 
 
-def read_pair(frame: Frame) -> StereoPair:
+def read_pair(frame: StereoFrame) -> StereoPair:
     """Decode what training needs of a frame."""
     return StereoPair(frame.left, frame.right, frame.disparity_left, frame.disparity_right)
 
@@ -90,6 +77,9 @@ class PairCache:
         pair = self._pairs.get(key)
         return read_pair(self._sources[key[0]].frames[key[1]]) if pair is None else pair
 
+    def name(self, source: int, frame: int) -> str:
+        return self._sources[source].frames[frame].name
+
     def first(self, count: int) -> Iterator[StereoPair]:
         """The first pairs, all sources in turn."""
         return (self[key] for key in itertools.islice(self._interleaved(), count))
@@ -105,7 +95,8 @@ class PairCache:
 def schedule_draws(sources: Sequence[Source], draws: int, seed: int) -> NDArray[np.int64]:
     """Which (source, frame) each draw takes, (draws, 2): sources by weight, frames in a new order every pass.
 
-    A longer schedule begins with the shorter one.
+    A longer schedule begins with the shorter one. Shards are taken a few at a time, so that remote ones can be
+    fetched as the run goes on.
     """
     weights = np.array([source.weight for source in sources], np.float64)
     rng = np.random.default_rng([seed, 0])
@@ -114,10 +105,24 @@ def schedule_draws(sources: Sequence[Source], draws: int, seed: int) -> NDArray[
     for index, source in enumerate(sources):
         places = np.flatnonzero(chosen == index)
         order = np.random.default_rng([seed, 1, index])
-        passes = [order.permutation(len(source.frames)) for _ in range(-(-len(places) // len(source.frames)))]
+        passes = [shuffle(order, source.frames) for _ in range(-(-len(places) // len(source.frames)))]
         schedule[places, 0] = index
         schedule[places, 1] = np.concatenate([*passes, np.empty(0, np.int64)])[: len(places)]
     return schedule
+
+
+def shuffle(rng: np.random.Generator, frames: Sequence[StereoFrame]) -> NDArray[np.int64]:
+    """A random order of the frames; of those in shards, one that stays in `SHARDS_TOGETHER` shards at a time."""
+    if not isinstance(frames, ShardFrames):
+        return rng.permutation(len(frames))
+    shards = np.split(np.arange(len(frames)), np.cumsum(frames.groups)[:-1])
+    shards = [shards[place] for place in rng.permutation(len(shards))]
+    return np.concatenate(
+        [
+            rng.permutation(np.concatenate(shards[first : first + SHARDS_TOGETHER]))
+            for first in range(0, len(shards), SHARDS_TOGETHER)
+        ]
+    )
 
 
 class CropDataset(Dataset[Batch]):
@@ -133,22 +138,21 @@ class CropDataset(Dataset[Batch]):
         self._draws_per_step = draws_per_step
 
     def __getitem__(self, draw: int) -> Batch:
-        source, frame = self._schedule[draw]
+        source, frame = (int(number) for number in self._schedule[draw])
+        size = (self._preset.crop_height, self._preset.crop_width)
+        pair = self._cache[source, frame]
+        if pair.left.shape[0] < size[0] or pair.left.shape[1] < size[1]:
+            raise TrainingError(too_small(self._cache.name(source, frame), pair.left.shape[:2], size))
         rng = np.random.default_rng([self._seed, 2, draw])
-        sample = augment(
-            rng,
-            self._cache[int(source), int(frame)],
-            (self._preset.crop_height, self._preset.crop_width),
-            self._preset.augmentation,
-            step=draw // self._draws_per_step,
+        return as_tensors(
+            augment(rng, pair, size, self._preset.augmentation, step=draw // self._draws_per_step)
         )
-        return as_tensors(sample)
 
 
 class FrameDataset(Dataset[Batch]):
     """Whole frames, as they are."""
 
-    def __init__(self, frames: Sequence[Frame]) -> None:
+    def __init__(self, frames: Sequence[StereoFrame]) -> None:
         self._frames = frames
 
     def __len__(self) -> int:
@@ -177,7 +181,7 @@ class StereoDataModule(pl.LightningDataModule):
     def __init__(
         self,
         sources: Sequence[Source],
-        validation: Sequence[Frame],
+        validation: Sequence[StereoFrame],
         preset: Preset,
         steps: int,
         seed: int,
@@ -221,31 +225,39 @@ class StereoDataModule(pl.LightningDataModule):
 
 
 def open_sources(
-    folders: Sequence[tuple[Path, float]], crop: tuple[int, int]
-) -> tuple[list[Source], list[Frame]]:
-    """The training split of each folder with its weight, and all their validation splits' frames.
+    data: Sequence[tuple[str | Path, float]], crop: tuple[int, int], validation: Sequence[str | Path] = ()
+) -> tuple[list[Source], list[StereoFrame]]:
+    """The training frames of each data set with its weight, and the frames to validate on.
 
     Args:
+        data: sources as `datagen.source.open_source` takes them, and their weights.
         crop: (height, width) that every training frame must hold.
+        validation: sources to validate on; without any, the val splits of `data`.
 
     Raises:
-        TrainingError: no folder, a weight that is not positive, or frames smaller than the crop.
-        DatasetError: a folder that is no data set or has no training split.
+        TrainingError: no data, a weight that is not positive, or frames smaller than the crop.
+        DatasetError: a source that is no data set or has nothing to train on.
     """
-    if not folders:
+    if not data:
         raise TrainingError("training needs at least one data set")
     sources: list[Source] = []
-    validation: list[Frame] = []
-    for folder, weight in folders:
+    held_out: list[StereoFrame] = []
+    for location, weight in data:
         if not weight > 0:
-            raise TrainingError(f"{folder}: the weight of a data set must be positive, got {weight}")
-        frames = StereoDataset(folder, "train")
+            raise TrainingError(f"{location}: the weight of a data set must be positive, got {weight}")
+        opened = open_source(location)
+        frames = opened.frames("train")
         height, width = frames[0].size
         if height < crop[0] or width < crop[1]:
-            raise TrainingError(
-                f"{folder}: frames of {width}x{height} are smaller than the preset's {crop[1]}x{crop[0]} crops"
-            )
+            raise TrainingError(too_small(str(location), (height, width), crop))
         sources.append(Source(frames, weight))
-        if frames.layout.committed_scenes("val"):
-            validation.extend(StereoDataset(folder, "val"))
-    return sources, validation
+        if not validation:
+            held_out.extend(opened.validation_frames())
+    for location in validation:
+        held_out.extend(open_source(location).held_out_frames())
+    return sources, held_out
+
+
+def too_small(name: str, size: tuple[int, ...], crop: tuple[int, int]) -> str:
+    """The sentence about frames that hold no crop; sizes are (height, width)."""
+    return f"{name}: frames of {size[1]}x{size[0]} are smaller than the preset's {crop[1]}x{crop[0]} crops"

@@ -45,10 +45,11 @@ CALIBRATION_BATCHES = 20
 
 def train(
     task: str,
-    data: Sequence[tuple[Path, float]],
+    data: Sequence[tuple[str | Path, float]],
     out: Path,
     preset: str | Preset = "small",
     *,
+    validation: Sequence[str | Path] = (),
     init: Path | None = None,
     resume: bool = False,
     steps: int | None = None,
@@ -62,10 +63,11 @@ def train(
 
     Args:
         task: `regressor`, `regressor_f` (eq. 9, starts from a regressor), `confnet` or `gradnet` (on a frozen one).
-        data: data sets and their weights, how often each is drawn from; their train splits are trained on, their val
-            splits decide which weights are kept.
+        data: data sets (`datagen.source.open_source`) and their weights, how often each is drawn from; their train
+            splits are trained on, their val splits decide which weights are kept.
         out: run folder; receives `<task>.safetensors`, `<task>.json` and `logs/<task>/`.
         preset: name of a preset, or one of your own.
+        validation: data sets whose frames decide instead; needed where `data` has no val splits.
         init: run folder with the regressor to start from (`regressor`: optional) or to build on (other tasks: `out`
             by default, and copied there).
         resume: continue from the last checkpoint, as if never interrupted; starts anew where there is none.
@@ -94,6 +96,7 @@ def train(
         "steps": steps,
         "seed": seed,
         "data": [[str(f), w] for f, w in data],
+        "validation": [str(source) for source in validation],
     }
     resume = resume and checkpoint.is_file()
     if resume:
@@ -104,8 +107,8 @@ def train(
         )
     write_text(logs / "settings.json", json.dumps(settings, indent=2) + "\n")
 
-    sources, validation = open_sources(data, (preset.crop_height, preset.crop_width))
-    module = StereoDataModule(sources, validation, preset, steps, seed, workers, cache_bytes)
+    sources, held_out = open_sources(data, (preset.crop_height, preset.crop_width), validation)
+    module = StereoDataModule(sources, held_out, preset, steps, seed, workers, cache_bytes)
     summary = TrainingSummary(preset_name, steps, seed, tuple((str(f), w) for f, w in data), best_step=0)
     with _quiet_lightning(), torch.random.fork_rng():
         torch.manual_seed(seed)

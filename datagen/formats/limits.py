@@ -22,12 +22,12 @@ def read_bounded(path: Path) -> bytes:
         raise FormatError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def check_image_size(path: Path, width: int, height: int, channels: int) -> None:
+def check_image_size(origin: Path | str, width: int, height: int, channels: int) -> None:
     """Raise FormatError unless an image of this size is not empty and within `MAX_ELEMENTS`."""
     if width <= 0 or height <= 0:
-        raise FormatError(f"{path}: its header declares an image of {width} x {height} pixels")
+        raise FormatError(f"{origin}: its header declares an image of {width} x {height} pixels")
     if width * height * channels > MAX_ELEMENTS:
         raise FormatError(
-            f"{path}: its header declares {width} x {height} pixels of {channels} channels, "
+            f"{origin}: its header declares {width} x {height} pixels of {channels} channels, "
             f"more than the {MAX_ELEMENTS} numbers allowed"
         )

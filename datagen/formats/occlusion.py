@@ -22,14 +22,18 @@ _LABELS[_GREYS] = [0, 1, 2]
 
 def read_occlusion(path: Path | str) -> NDArray[np.uint8]:
     """Read occlusion labels, (H, W) uint8 of 0, 1, 2. Raises FormatError."""
-    greys = read_png(path)
+    return labels_of(read_png(path), str(path))
+
+
+def labels_of(greys: NDArray[np.uint8] | NDArray[np.uint16], origin: str) -> NDArray[np.uint8]:
+    """Labels of the grey values that stand for them; `origin` names the file in errors. Raises FormatError."""
     if greys.ndim != 2 or greys.dtype != np.uint8:
-        raise FormatError(f"{path}: occlusion is 8-bit grey, not {greys.dtype} of shape {greys.shape}")
+        raise FormatError(f"{origin}: occlusion is 8-bit grey, not {greys.dtype} of shape {greys.shape}")
     labels = _LABELS[greys]
     if (labels == _NO_LABEL).any():
         value = greys[labels == _NO_LABEL][0]
         raise FormatError(
-            f"{path}: grey {value} is no occlusion label (0 visible, 255 occluded, 128 out of frame)"
+            f"{origin}: grey {value} is no occlusion label (0 visible, 255 occluded, 128 out of frame)"
         )
     return labels
 

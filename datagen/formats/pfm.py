@@ -28,17 +28,20 @@ def read_pfm(path: Path | str) -> NDArray[np.float32]:
     The scale's magnitude is not applied: Middlebury writes 1/255 there above disparities that are in
     pixels already, and no stereo benchmark's reader multiplies by it. Raises FormatError.
     """
-    path = Path(path)
-    data = read_bounded(path)
+    return decode_pfm(read_bounded(Path(path)), str(path))
+
+
+def decode_pfm(data: bytes, origin: str) -> NDArray[np.float32]:
+    """`read_pfm` of a file's content; `origin` names it in errors."""
     header = _HEADER.match(data)
     if header is None:
-        raise FormatError(f"{path}: is not a PFM file, its header does not parse")
+        raise FormatError(f"{origin}: is not a PFM file, its header does not parse")
     kind, width, height, channels = header[1], int(header[2]), int(header[3]), 3 if header[1] == b"PF" else 1
-    check_image_size(path, width, height, channels)
-    scale = _parse_scale(path, header[4])
+    check_image_size(origin, width, height, channels)
+    scale = _parse_scale(origin, header[4])
     expected = header.end() + 4 * width * height * channels
     if len(data) != expected:
-        raise FormatError(f"{path}: has {len(data)} bytes where its header promises {expected}")
+        raise FormatError(f"{origin}: has {len(data)} bytes where its header promises {expected}")
     values = np.frombuffer(data, "<f4" if scale < 0 else ">f4", offset=header.end())
     rows = values.reshape((height, width, 3) if kind == b"PF" else (height, width))
     return np.ascontiguousarray(rows[::-1], np.float32)
@@ -54,11 +57,11 @@ def write_pfm(path: Path | str, array: NDArray[np.floating[Any]]) -> None:
     write_bytes(path, header + np.ascontiguousarray(array[::-1], "<f4").tobytes())
 
 
-def _parse_scale(path: Path, word: bytes) -> float:
+def _parse_scale(origin: str, word: bytes) -> float:
     try:
         scale = float(word)
     except ValueError:
         scale = math.nan
     if not math.isfinite(scale) or scale == 0:
-        raise FormatError(f"{path}: the scale in its header is {word!r}, which gives no byte order")
+        raise FormatError(f"{origin}: the scale in its header is {word!r}, which gives no byte order")
     return scale

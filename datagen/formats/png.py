@@ -25,12 +25,15 @@ def read_png(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
 
     Every chunk's checksum is compared, so an accidental change of any byte is found. Raises FormatError.
     """
-    path = Path(path)
-    data = read_bounded(path)
-    _check_chunks(path, data)
+    return decode_png(read_bounded(Path(path)), str(path))
+
+
+def decode_png(data: bytes, origin: str) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """`read_png` of a file's content; `origin` names it in errors."""
+    _check_chunks(origin, data)
     image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
-        raise FormatError(f"{path}: is a PNG file whose pixels do not decode")
+        raise FormatError(f"{origin}: is a PNG file whose pixels do not decode")
     if image.ndim == 3:
         image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB if image.shape[2] == 3 else cv2.COLOR_BGRA2RGBA)
     return np.asarray(image)
@@ -67,33 +70,35 @@ def write_png(path: Path | str, array: NDArray[np.uint8] | NDArray[np.uint16]) -
     write_bytes(path, data.tobytes())
 
 
-def _check_chunks(path: Path, data: bytes) -> None:
+def _check_chunks(origin: str, data: bytes) -> None:
     """Walk the chunks: signature, bounded image header, checksums, an end, and nothing after it."""
     if not data.startswith(_SIGNATURE):
-        raise FormatError(f"{path}: is not a PNG file, its signature is missing")
+        raise FormatError(f"{origin}: is not a PNG file, its signature is missing")
     position, name = len(_SIGNATURE), b""
     while name != b"IEND":
         if position + 12 > len(data):
-            raise FormatError(f"{path}: is a PNG file cut off after {len(data)} bytes")
+            raise FormatError(f"{origin}: is a PNG file cut off after {len(data)} bytes")
         length, name = struct.unpack_from(">I4s", data, position)
         end = position + 12 + length
         if end > len(data):
-            raise FormatError(f"{path}: is a PNG file cut off after {len(data)} bytes")
+            raise FormatError(f"{origin}: is a PNG file cut off after {len(data)} bytes")
         if zlib.crc32(data[position + 4 : end - 4]) != struct.unpack_from(">I", data, end - 4)[0]:
-            raise FormatError(f"{path}: is a damaged PNG file, the checksum at byte {end - 4} does not match")
+            raise FormatError(
+                f"{origin}: is a damaged PNG file, the checksum at byte {end - 4} does not match"
+            )
         if (position == len(_SIGNATURE)) != (name == b"IHDR"):
-            raise FormatError(f"{path}: is a PNG file that does not begin with its one image header")
+            raise FormatError(f"{origin}: is a PNG file that does not begin with its one image header")
         if name == b"IHDR":
-            _check_header(path, data[position + 8 : end - 4])
+            _check_header(origin, data[position + 8 : end - 4])
         if name in (b"acTL", b"fcTL", b"fdAT"):
-            raise FormatError(f"{path}: is an animated PNG file, not one image")
+            raise FormatError(f"{origin}: is an animated PNG file, not one image")
         position = end
     if position != len(data):
-        raise FormatError(f"{path}: is a PNG file with {len(data) - position} bytes after its end")
+        raise FormatError(f"{origin}: is a PNG file with {len(data) - position} bytes after its end")
 
 
-def _check_header(path: Path, header: bytes) -> None:
+def _check_header(origin: str, header: bytes) -> None:
     if len(header) != 13:
-        raise FormatError(f"{path}: is a PNG file whose image header has {len(header)} bytes, not 13")
+        raise FormatError(f"{origin}: is a PNG file whose image header has {len(header)} bytes, not 13")
     width, height = struct.unpack_from(">II", header)
-    check_image_size(path, width, height, channels=4)
+    check_image_size(origin, width, height, channels=4)

@@ -16,14 +16,14 @@ from stereoforge.values import parse_methods, shown
 class Evaluate:
     """Evaluate on data sets and write report.html, results.csv and results.json."""
 
-    data: Annotated[tyro.conf.Positional[tuple[Path, ...]], shown("DATA")]
-    """Data sets."""
+    data: Annotated[tyro.conf.Positional[tuple[str, ...]], shown("DATA")]
+    """Data sets: folders or URLs, with FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
     weights: Annotated[Path, shown("RUN")]
     """Run folder of the networks."""
     out: Annotated[Path, shown("REPORT")]
     """Folder for the report."""
     split: Literal["train", "val", "test"] = "test"
-    """Which split of the data sets."""
+    """Which split of the data sets; those without splits are taken whole."""
     methods: Annotated[str, shown("LIST", "all there are")] = ""
     """Rows of the tables, comma-separated."""
     parameters: Annotated[
@@ -34,7 +34,7 @@ class Evaluate:
     """What the networks run on: cpu, cuda, ..."""
 
     def run(self) -> None:
-        from datagen import StereoDataset
+        from datagen.source import open_source
         from stereoforge.errors import UsageError
         from stereoforge.evaluation import evaluate_datasets, report_evaluation
         from stereoforge.prediction import open_predictors, open_settings
@@ -42,12 +42,13 @@ class Evaluate:
         methods = parse_methods(self.methods)
         if not self.data:
             raise UsageError("evaluate needs at least one data set")
-        datasets = [StereoDataset(root, self.split) for root in self.data]
+        datasets = [open_source(source).frames(self.split) for source in self.data]
         settings = open_settings(self.parameters, self.weights)
         evaluation = evaluate_datasets(
             datasets, open_predictors(self.weights, self.device), settings.rows(methods)
         )
-        files = report_evaluation(evaluation, datasets, self.weights, self.out)
+        names = [f"{source} ({self.split})" for source in self.data]
+        files = report_evaluation(evaluation, names, self.weights, self.out)
         for name, reason in evaluation.skipped.items():
             console.print(f"{name} did not run: {reason}", markup=False)
         console.print(f"{files.html}: {len(evaluation.frames)} frames")

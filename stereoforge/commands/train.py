@@ -10,7 +10,7 @@ import tyro
 
 from stereoforge.errors import UsageError
 from stereoforge.progress import console
-from stereoforge.values import parse_weighted_folder, shown
+from stereoforge.values import parse_weighted_source, shown
 
 
 @dataclass(frozen=True)
@@ -25,12 +25,15 @@ class Train:
         tyro.conf.Positional[Literal["regressor", "regressor_f", "confnet", "gradnet"]], shown("TASK")
     ]
     """regressor (DispNetCorr1D), regressor_f (fine-tuned on gradients too), confnet or gradnet."""
-    data: Annotated[tuple[str, ...], shown("DIR[:WEIGHT]")]
-    """Data sets, each with how often it is drawn from relative to the others (default 1)."""
+    data: Annotated[tuple[str, ...], shown("DATA[:WEIGHT]")]
+    """Data sets, each with how often it is drawn from relative to the others (default 1): folders or URLs, with
+    FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
     out: Annotated[Path, shown("RUN")]
     """Run folder."""
     preset: Literal["tiny", "small", "full"] = "small"
     """tiny: minutes on a laptop; small: hours; full: the paper's own training."""
+    validation: Annotated[tuple[str, ...], shown("DATA", "the val splits of --data")] = ()
+    """Data sets that decide which weights are kept."""
     init: Annotated[Path | None, shown("RUN", "none")] = None
     """Run folder of the regressor to start from or to build on."""
     resume: bool = False
@@ -52,7 +55,7 @@ class Train:
         ):
             if value is not None and value < least:
                 raise UsageError(f"--{name} must be at least {least}, got {value}")
-        data = [parse_weighted_folder(text) for text in self.data]
+        data = [parse_weighted_source(text) for text in self.data]
         from training.train import train
 
         summary = train(
@@ -60,6 +63,7 @@ class Train:
             data,
             self.out,
             self.preset,
+            validation=self.validation,
             init=self.init,
             resume=self.resume,
             steps=self.steps,

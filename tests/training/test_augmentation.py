@@ -134,6 +134,21 @@ def test_mirroring_twice_is_nothing() -> None:
     np.testing.assert_array_equal(again.disparity_left, pair.disparity_left)
 
 
+def test_pairs_without_the_right_truth_are_not_mirrored() -> None:
+    """With the same draws as for a pair that has it: only the mirroring is left out."""
+    pair = slanted_plane(2)
+    plain = replace(GEOMETRY, horizontal_flip=0.0)
+    without = augment(
+        np.random.default_rng(3), replace(pair, disparity_right=None), (64, 96),
+        replace(GEOMETRY, horizontal_flip=1.0),
+    )  # fmt: skip
+    expected = augment(np.random.default_rng(3), pair, (64, 96), plain)
+    np.testing.assert_array_equal(without.left, expected.left)
+    np.testing.assert_array_equal(without.disparity, expected.disparity)
+    with pytest.raises(ValueError, match="without the right view's disparity cannot be mirrored"):
+        mirror(replace(pair, disparity_right=None))
+
+
 @settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 10_000), crop=st.sampled_from([(384, 768), (128, 320), (540, 960)]))
 def test_windows_stay_inside(seed: int, crop: tuple[int, int]) -> None:

@@ -1,5 +1,6 @@
 """Which crop a draw gives: decided by seed and number alone."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,11 @@ import pytest
 import torch
 
 from datagen import DatasetError
-from tests.training.synthetic import write_dataset
-from training.data import PairCache, Source, StereoDataModule, open_sources, schedule_draws
+from datagen.sources.webdataset import ShardFrames
+from tests.datagen.sources import published
+from tests.training.synthetic import random_pair, write_dataset
+from training.augmentation import AugmentationConfig
+from training.data import PairCache, Source, StereoDataModule, open_sources, schedule_draws, shuffle
 from training.errors import TrainingError
 from training.presets import OptimizerConfig, Preset
 
@@ -67,6 +71,49 @@ def test_schedule_takes_every_frame_once_a_pass_and_sources_by_weight() -> None:
         assert (np.sort(passes, axis=1) == np.arange(count)).all()
         assert not (passes == passes[0]).all()
     np.testing.assert_array_equal(schedule_draws(frames, 100, seed=5), schedule[:100])
+
+
+def test_shards_are_taken_a_few_at_a_time() -> None:
+    """A pass over shards takes every sample once, eight shards at a time."""
+    frames = ShardFrames(tuple((f"train-{i // 5:06d}.tar", str(i)) for i in range(200)))
+    order = shuffle(np.random.default_rng(0), frames)
+    assert sorted(order) == list(range(200))
+    for window in order.reshape(5, 40):
+        assert len({index // 5 for index in window}) == 8
+    assert not (np.diff(order[:40]) > 0).all()
+
+
+def test_every_kind_of_source_is_trained_on(folders: tuple[Path, Path], tmp_path: Path) -> None:
+    """Mixed sets: ours, and a sparse one of another layout, without the right view's truth, held out in part."""
+    for index in range(4):
+        name = f"{index:06d}_10.png"
+        w = random_pair(np.random.default_rng(index), 80, 140)
+        published.png(tmp_path / f"training/image_2/{name}", w.left)
+        published.png(tmp_path / f"training/image_3/{name}", w.right)
+        code = np.rint(w.disparity_left * 256).astype(np.uint16)
+        code[::2] = 0
+        published.png(tmp_path / f"training/disp_occ_0/{name}", code)
+    data = [(folders[1], 1.0), (f"kitti2015:{tmp_path}#0-1", 3.0)]
+    sources, held_out = open_sources(data, (64, 64), [f"{tmp_path}#2-3"])
+    assert [frame.name for frame in held_out] == ["000002_10", "000003_10"]
+    assert [len(source.frames) for source in sources] == [2, 2]
+    preset = replace(PRESET, augmentation=AugmentationConfig(horizontal_flip=1.0))
+    batches = list(StereoDataModule(sources, held_out, preset, 5, 0).block(0))
+    holes = torch.stack([torch.isnan(batch["disparity"]).float().mean((1, 2, 3)) for batch in batches])
+    assert {share > 0.3 for share in holes.flatten().tolist()} == {True, False}
+
+
+def test_frames_smaller_than_the_crop_are_named(tmp_path: Path) -> None:
+    """Sets such as KITTI mix sizes; only the first frame is looked at before the run."""
+    for index, width in enumerate((140, 60)):
+        for folder in ("image_2", "image_3"):
+            image = np.zeros((80, width, 3), np.uint8)
+            published.png(tmp_path / f"training/{folder}/{index:06d}_10.png", image)
+        code = np.ones((80, width), np.uint16)
+        published.png(tmp_path / f"training/disp_occ_0/{index:06d}_10.png", code)
+    sources, _ = open_sources([(tmp_path, 1.0)], (64, 64))
+    with pytest.raises(TrainingError, match="000001_10: frames of 60x80 are smaller than the preset's 64x64"):
+        list(StereoDataModule(sources, [], PRESET, 5, 0).block(0))
 
 
 def test_cache_is_bounded(folders: tuple[Path, Path]) -> None:

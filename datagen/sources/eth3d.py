@@ -1,0 +1,35 @@
+"""ETH3D two-view stereo (Schöps et al., CVPR 2017): `two_view_training/<scene>/im0.png, im1.png` and
+`two_view_training_gt/<scene>/disp0GT.pfm, mask0nocc.png`, the truth also found beside the images.
+
+Encoded as Middlebury's: infinite where there is none, the mask 255 where both views show the point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from datagen.frame import FileFrame, FileFrames, StereoFrame
+from datagen.source import SourceFormat
+from datagen.sources.middlebury import ETH3D_IMAGES, scene_frame
+
+
+def _recognises(root: Path) -> bool:
+    return (root / ETH3D_IMAGES).is_dir()
+
+
+def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
+    return FileFrames(_frames(Path(root)))
+
+
+def _frames(root: Path) -> Iterator[FileFrame]:
+    truths = root / f"{ETH3D_IMAGES}_gt"
+    for image in sorted((root / ETH3D_IMAGES).glob("*/im0.png")):
+        scene = image.parent
+        beside = truths / scene.name
+        frame = scene_frame(scene.name, scene, beside if beside.is_dir() else scene)
+        if frame is not None:
+            yield frame
+
+
+FORMATS = (SourceFormat("eth3d", "ETH3D two-view", _recognises, _find),)

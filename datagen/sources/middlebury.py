@@ -1,0 +1,82 @@
+"""Middlebury with floating-point truth: the 2014 and 2021 scenes and the version 3 benchmark (Scharstein et al.,
+GCPR 2014). A folder a scene: `im0.png`, `im1.png`, `disp0.pfm` (benchmark: `disp0GT.pfm`), often also `disp1` and
+`mask0nocc.png`.
+
+Disparities are pixels, infinity where there is none. The mask is 255 where both views show the point; without it
+occlusion is derived from both disparities, if there are both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.derived import occlusion_from_mask
+from datagen.formats import read_pfm, read_png
+from datagen.formats.picture import read_picture
+from datagen.frame import FileFrame, FileFrames, StereoFrame
+from datagen.source import SourceFormat
+
+ETH3D_IMAGES = "two_view_training"
+"""ETH3D's folder of images: its scenes are encoded as these are (`datagen.sources.eth3d`)."""
+_SHOWN_BY_BOTH = 255
+_TRUTH = ("disp{}GT.pfm", "disp{}.pfm")
+
+
+def read_disparity(path: Path) -> NDArray[np.float32]:
+    """Read a disparity whose missing values are infinite. Raises FormatError."""
+    disparity = read_pfm(path)
+    disparity[np.isinf(disparity)] = np.nan
+    return disparity
+
+
+def read_labels(truth: Path, mask: Path) -> NDArray[np.uint8]:
+    """Labels from `mask0nocc.png`. Raises FormatError."""
+    disparity = read_disparity(truth)
+    shown = read_png(mask)
+    hidden = ((shown if shown.ndim == 2 else shown[..., 0]) != _SHOWN_BY_BOTH) & ~np.isnan(disparity)
+    return occlusion_from_mask(disparity, hidden)
+
+
+def scene_frame(name: str, images: Path, truths: Path) -> FileFrame | None:
+    """The frame of a scene's folders, or None without truth."""
+    left = _truth(truths, 0)
+    if left is None:
+        return None
+    right, mask = _truth(truths, 1), truths / "mask0nocc.png"
+    return FileFrame(
+        name=name,
+        read_left=partial(read_picture, images / "im0.png"),
+        read_right=partial(read_picture, images / "im1.png"),
+        read_disparity_left=partial(read_disparity, left),
+        read_disparity_right=None if right is None else partial(read_disparity, right),
+        read_occlusion_left=partial(read_labels, left, mask) if mask.is_file() else None,
+    )
+
+
+def _truth(folder: Path, view: int) -> Path | None:
+    return next((path for name in _TRUTH if (path := folder / name.format(view)).is_file()), None)
+
+
+def _recognises(root: Path) -> bool:
+    return not (root / ETH3D_IMAGES).is_dir() and any(True for _ in _frames(root))
+
+
+def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
+    return FileFrames(_frames(Path(root)))
+
+
+def _frames(root: Path) -> Iterator[FileFrame]:
+    for pattern in ("im0.png", "*/im0.png", "*/*/im0.png"):
+        for image in sorted(root.glob(pattern)):
+            name = image.parent.relative_to(root).as_posix()
+            frame = scene_frame(image.parent.name if name == "." else name, image.parent, image.parent)
+            if frame is not None:
+                yield frame
+
+
+FORMATS = (SourceFormat("middlebury", "Middlebury", _recognises, _find),)

@@ -1,0 +1,37 @@
+"""Our own data sets (docs/conventions.md): nothing is derived."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from datagen.dataset import StereoDataset, StereoSample, open_layout
+from datagen.frame import StereoFrame
+from datagen.layout import SPLITS
+from datagen.source import SourceFormat
+
+
+def _recognises(root: Path) -> bool:
+    return (root / "recipe.yaml").is_file()
+
+
+def _find_frames(location: str, split: str, render_pass: str) -> Sequence[StereoFrame]:
+    if split == "val" and not open_layout(location).committed_scenes(split):
+        return []
+    frames: Sequence[StereoSample] = StereoDataset(location, split, render_pass)
+    return frames
+
+
+FORMATS = (
+    SourceFormat(
+        "native", "a data set of ours", _recognises, partial(_find_frames, render_pass="clean"), SPLITS
+    ),
+    SourceFormat(
+        "native-final",
+        "a data set of ours (final pass)",
+        lambda _: False,
+        partial(_find_frames, render_pass="final"),
+        SPLITS,
+    ),
+)

@@ -1,0 +1,80 @@
+"""MPI Sintel stereo (Butler et al., ECCV 2012): `training/{clean,final}_{left,right}`, `disparities`,
+`occlusions`, `outofframe`.
+
+Disparity of the left view only, in a colour PNG: d = 4 R + G / 64 + B / 16384 pixels, valid everywhere. The two
+masks are white where the right view does not show the point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.errors import FormatError
+from datagen.formats import read_png
+from datagen.formats.picture import read_picture
+from datagen.frame import FileFrame, FileFrames, StereoFrame
+from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.source import SourceFormat
+
+_UNITS = np.array([4, 1 / 64, 1 / 16384], np.float32)
+
+
+def read_disparity(path: Path) -> NDArray[np.float32]:
+    """Read a Sintel disparity. Raises FormatError."""
+    colors = read_png(path)
+    if colors.dtype != np.uint8 or colors.ndim != 3:
+        raise FormatError(f"{path}: a Sintel disparity is an 8-bit colour PNG, not {colors.dtype}")
+    disparity: NDArray[np.float32] = colors[..., :3].astype(np.float32) @ _UNITS
+    return disparity
+
+
+def read_labels(occlusion: Path, out_of_frame: Path) -> NDArray[np.uint8]:
+    """Join the two masks into our labels. Raises FormatError."""
+    hidden, outside = (_mask(read_png(path)) for path in (occlusion, out_of_frame))
+    return np.where(outside, OUT_OF_FRAME, np.where(hidden, OCCLUDED, VISIBLE)).astype(np.uint8)
+
+
+def _mask(image: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.bool_]:
+    return (image if image.ndim == 2 else image[..., 0]) > 0
+
+
+def _training(root: Path) -> Path:
+    return root / "training" if (root / "training").is_dir() else root
+
+
+def _recognises(root: Path) -> bool:
+    folder = _training(root)
+    return (folder / "disparities").is_dir() and any(
+        (folder / f"{p}_left").is_dir() for p in ("clean", "final")
+    )
+
+
+def _find(root: str, split: str, render_pass: str) -> Sequence[StereoFrame]:  # noqa: ARG001
+    return FileFrames(_frames(_training(Path(root)), render_pass))
+
+
+def _frames(folder: Path, render_pass: str) -> Iterator[FileFrame]:
+    for truth in sorted((folder / "disparities").glob("*/*.png")):
+        path = truth.relative_to(folder / "disparities")
+        yield FileFrame(
+            name=path.with_suffix("").as_posix(),
+            read_left=partial(read_picture, folder / f"{render_pass}_left" / path),
+            read_right=partial(read_picture, folder / f"{render_pass}_right" / path),
+            read_disparity_left=partial(read_disparity, truth),
+            read_occlusion_left=partial(
+                read_labels, folder / "occlusions" / path, folder / "outofframe" / path
+            ),
+        )
+
+
+FORMATS = (
+    SourceFormat("sintel", "MPI Sintel", _recognises, partial(_find, render_pass="clean")),
+    SourceFormat(
+        "sintel-final", "MPI Sintel (final pass)", lambda _: False, partial(_find, render_pass="final")
+    ),
+)

@@ -1,0 +1,135 @@
+"""WebDataset shards as `stereoforge export` writes them (docs/conventions.md): `<split>-%06d.tar`, local or at any URL
+fsspec opens; samples `<split>-<scene>-<frame>` whose members are encoded as the native tree's files.
+
+Gradients are derived from the disparity, which gives the native tree's numbers again; everything else is read.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import groupby
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, overload
+
+import fsspec
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.errors import DatasetError, FormatError
+from datagen.formats.occlusion import labels_of
+from datagen.formats.pfm import decode_pfm
+from datagen.formats.png import decode_png
+from datagen.frame import FileFrame, StereoFrame
+from datagen.layout import SPLITS
+from datagen.shards import list_shards, local_copy, read_sample_member, shard_index
+from datagen.source import SourceFormat
+
+INDEX_NAME = "index.json"
+_SHARD_NAME = re.compile(rf"({'|'.join(SPLITS)})-\d{{6,}}\.tar")
+
+
+@dataclass(frozen=True)
+class ShardFrames(Sequence[StereoFrame]):
+    """The samples of one split's shards, in order. No shard is opened before one of its samples is read, if the
+    folder has an index."""
+
+    samples: tuple[tuple[str, str], ...]
+    """(shard, key) of every sample."""
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+    @overload
+    def __getitem__(self, index: int) -> StereoFrame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> ShardFrames: ...
+
+    def __getitem__(self, index: int | slice) -> StereoFrame | ShardFrames:
+        if isinstance(index, slice):
+            return ShardFrames(self.samples[index])
+        return _frame(*self.samples[index])
+
+    @cached_property
+    def groups(self) -> list[int]:
+        """How many samples of each shard there are, in order: whoever draws frames at random does well to stay in
+        a few shards at a time."""
+        return [len(list(samples)) for _, samples in groupby(self.samples, key=itemgetter(0))]
+
+
+def _recognises(root: Path) -> bool:
+    names = [root.name] if root.is_file() else (path.name for path in root.glob("*.tar"))
+    return any(_SHARD_NAME.fullmatch(name) for name in names)
+
+
+def _find(location: str, split: str) -> Sequence[StereoFrame]:
+    index = _read_index(location)
+    shards = list_shards(location) if index is None else [f"{location.rstrip('/')}/{name}" for name in index]
+    samples: list[tuple[str, str]] = []
+    for shard in sorted(shards):
+        name = _SHARD_NAME.fullmatch(shard.rpartition("/")[2])
+        if name and name[1] == split:
+            keys = shard_index(local_copy(shard)) if index is None else index[name[0]]
+            samples += ((shard, key) for key in keys)
+    return ShardFrames(tuple(samples))
+
+
+def _read_index(location: str) -> dict[str, list[str]] | None:
+    """Shard names to their samples' keys, None without an index file. Raises FormatError for a damaged one."""
+    if location.endswith(".tar"):
+        return None
+    url = f"{location.rstrip('/')}/{INDEX_NAME}"
+    try:
+        with fsspec.open(url, "rb") as file:
+            content = file.read()
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, ImportError) as error:
+        raise DatasetError(f"{url}: cannot be read ({error})") from error
+    try:
+        shards = json.loads(content)["shards"]
+        if not all(
+            _SHARD_NAME.fullmatch(name)
+            and isinstance(keys, list)
+            and all(isinstance(key, str) for key in keys)
+            for name, keys in shards.items()
+        ):
+            raise ValueError("a shard's name or its list of samples is not as it should be")
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise FormatError(f"{url}: is not an index of shards ({error})") from error
+    return dict(shards)
+
+
+def _frame(shard: str, key: str) -> FileFrame:
+    read = partial(_read, shard, key)
+    return FileFrame(
+        name=key,
+        read_left=partial(read, "left.png", decode_png),
+        read_right=partial(read, "right.png", decode_png),
+        read_disparity_left=partial(read, "disparity_left.pfm", decode_pfm),
+        read_disparity_right=partial(read, "disparity_right.pfm", decode_pfm),
+        read_occlusion_left=partial(read, "occlusion_left.png", _decode_occlusion),
+        read_object_index_left=partial(read, "object_index_left.png", decode_png),
+    )
+
+
+def _decode_occlusion(data: bytes, origin: str) -> NDArray[np.uint8]:
+    return labels_of(decode_png(data, origin), origin)
+
+
+def _read(shard: str, key: str, member: str, decode: Any) -> Any:
+    try:
+        data = read_sample_member(shard, key, member)
+    except KeyError as error:
+        raise FormatError(f"{shard}: has no sample {key}") from error
+    if data is None:
+        raise FormatError(f"{shard}: its sample {key} has no {member}")
+    return decode(data, f"{shard}: {key}.{member}")
+
+
+FORMATS = (SourceFormat("webdataset", "WebDataset shards", _recognises, _find, SPLITS),)

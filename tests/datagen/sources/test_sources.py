@@ -1,0 +1,296 @@
+"""Every reader on files in the published encoding: values, signs, rows, holes, labels; and the choice of reader."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import fsspec
+import numpy as np
+import pytest
+
+from datagen import DatasetError
+from datagen.derived import derive_occlusion
+from datagen.shards import CACHE_VARIABLE
+from datagen.source import DataSource, open_source, source_formats
+from tests.datagen.sources import published
+from tests.datagen.sources.published import World, png, shard, shard_members, world
+
+SETS: dict[str, Callable[[Path], World]] = {
+    name: getattr(published, name)
+    for name in (
+        "flyingthings3d", "driving", "monkaa", "sintel", "kitti2012", "kitti2015", "middlebury", "eth3d",
+        "middlebury2003", "crestereo", "webdataset",
+    )
+}  # fmt: skip
+WITH_RIGHT_TRUTH = {
+    "flyingthings3d", "driving", "monkaa", "middlebury", "middlebury2003", "crestereo", "webdataset",
+}  # fmt: skip
+DERIVED_LABELS = {"flyingthings3d", "driving", "monkaa", "middlebury2003", "crestereo"}
+GREY = {"eth3d"}
+JPEG_TOLERANCE = 60
+"""Of single pixels of noise, which JPEG hardly keeps."""
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_frame(name: str, tmp_path: Path) -> None:
+    """Recognised without being told, and every array means in memory what docs/conventions.md says."""
+    w = SETS[name](tmp_path / "set")
+    source = open_source(tmp_path / "set")
+    assert source.format.name == name
+    frames = source.frames("train")
+    assert len(frames) == 1
+    frame = frames[0]
+    assert frame.size == (published.HEIGHT, published.WIDTH)
+    expected_images = [np.repeat(i[..., :1], 3, axis=2) if name in GREY else i for i in (w.left, w.right)]
+    for image, expected in zip((frame.left, frame.right), expected_images, strict=True):
+        assert image.dtype == np.uint8
+        error = np.abs(image.astype(int) - expected).mean()
+        assert error == 0 or (name == "crestereo" and error < JPEG_TOLERANCE)
+
+    truth = holes(name, w.disparity_left)
+    np.testing.assert_array_equal(frame.disparity_left, truth)
+    assert frame.disparity_left.dtype == np.float32
+    if name in WITH_RIGHT_TRUTH:
+        right = w.disparity_right.copy()
+        if name == "middlebury2003":
+            right[0] = np.nan
+        np.testing.assert_array_equal(frame.disparity_right, right)
+    else:
+        assert frame.disparity_right is None
+
+    valid = ~np.isnan(truth)
+    assert frame.occlusion_left is not None
+    certain = valid & ~w.silhouette if name in DERIVED_LABELS else valid
+    assert (w.occlusion_left[certain] == 1).any()
+    np.testing.assert_array_equal(frame.occlusion_left[certain], w.occlusion_left[certain])
+    both = valid[:-1, :-1] & valid[:-1, 1:] & valid[1:, :-1]
+    smooth = both & (np.abs(np.diff(truth, axis=1)[:-1]) <= 1) & (np.abs(np.diff(truth, axis=0)[:, :-1]) <= 1)
+    np.testing.assert_array_equal(frame.gradient_valid_left[:-1, :-1], smooth)
+    np.testing.assert_array_equal(
+        frame.gradient_left[:-1, :-1, 1][smooth], np.diff(truth, axis=0)[:, :-1][smooth]
+    )
+    assert np.isfinite(frame.gradient_left).all()
+
+
+def holes(name: str, truth: np.ndarray) -> np.ndarray:
+    """The truth with NaN where the set leaves it out."""
+    truth = truth.copy()
+    if name.startswith("kitti"):
+        truth[::2] = np.nan
+    elif name in ("middlebury", "eth3d", "middlebury2003"):
+        truth[0] = np.nan
+    return truth
+
+
+def test_every_format_is_tested() -> None:
+    formats = {name.removesuffix("-final") for name in source_formats()}
+    assert formats == set(SETS) | {"native"}
+
+
+def test_final_passes(tmp_path: Path) -> None:
+    w = published.flyingthings3d(tmp_path)
+    frame = open_source(f"flyingthings3d-final:{tmp_path}").frames("train")[0]
+    np.testing.assert_array_equal(frame.right, w.left)
+
+
+def test_sceneflow_errors_of_the_set_are_missing(tmp_path: Path) -> None:
+    """Negative disparities among positive ones, and those beyond the image's width, mark no point."""
+    w = published.monkaa(tmp_path)
+    truth = w.disparity_left.copy()
+    truth[0, :3] = (-5, 1000, np.inf)
+    published.pfm(tmp_path / "disparity/eating_x2/left/0000.pfm", truth)
+    got = open_source(tmp_path).frames("test")[0].disparity_left
+    assert np.isnan(got[0, :3]).all()
+    assert np.isnan(got).sum() == 3
+
+
+@pytest.mark.parametrize(("width", "scale"), [(450, 4), (900, 2), (1800, 1)])
+def test_middlebury_2003_scales_go_with_the_resolution(width: int, scale: int, tmp_path: Path) -> None:
+    code = np.full((4, width), 88, np.uint8)
+    code[0] = 0
+    for name in ("im2", "im6"):
+        png(tmp_path / f"teddy/{name}.png", np.zeros((4, width, 3), np.uint8))
+    png(tmp_path / "teddy/disp2.png", code)
+    truth = open_source(tmp_path).frames("test")[0].disparity_left
+    assert np.isnan(truth[0]).all()
+    assert (truth[1:] == 88 / scale).all()
+
+
+def test_kitti_names_objects(tmp_path: Path) -> None:
+    w = published.kitti2015(tmp_path)
+    objects = open_source(tmp_path).frames("test")[0].object_index_left
+    assert objects is not None
+    np.testing.assert_array_equal(objects, np.where(w.disparity_left > 10, 3, 0))
+
+
+def test_splits(tmp_path: Path) -> None:
+    published.flyingthings3d(tmp_path / "flying")
+    source = open_source(tmp_path / "flying")
+    assert [source.frames(split)[0].name for split in ("train", "test")] == [
+        "TRAIN/B/0017/0009",
+        "TEST/B/0017/0009",
+    ]
+    assert list(source.validation_frames()) == []
+    assert source.held_out_frames()[0].name.startswith("TEST")
+    with pytest.raises(DatasetError, match="FlyingThings3D has no split 'val'"):
+        source.frames("val")
+
+
+def test_selection(tmp_path: Path) -> None:
+    w = world()
+    folder = tmp_path / "training"
+    for index in range(5):
+        for name in ("image_2", "image_3"):
+            png(folder / f"{name}/{index:06d}_10.png", w.left)
+        png(folder / f"disp_occ_0/{index:06d}_10.png", np.full((12, 40), 256, np.uint16))
+    names = [frame.name for frame in open_source(f"{tmp_path}#1-3").frames("train")]
+    assert names == ["000001_10", "000002_10", "000003_10"]
+    assert len(open_source(f"kitti2015:{tmp_path}#0-0").frames("train")) == 1
+    assert open_source(tmp_path).frames("train")[0].occlusion_left is None
+    with pytest.raises(DatasetError, match=r"frames 3 to 5 were asked for, it has 5 \(from 0\)"):
+        open_source(f"{tmp_path}#3-5").frames("train")
+
+
+def test_wrong_sources_are_sentences(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"nothing: there is no such folder"):
+        open_source(tmp_path / "nothing")
+    with pytest.raises(
+        DatasetError, match="looks like no data set of a known layout; name the format in front"
+    ):
+        open_source(tmp_path)
+    with pytest.raises(DatasetError, match="has no frame with ground truth in the layout of KITTI 2015"):
+        open_source(f"kitti2015:{tmp_path}").frames("train")
+    with pytest.raises(DatasetError, match="say what is there, for example webdataset:s3://bucket/set"):
+        open_source("s3://bucket/set")
+    published.kitti2015(tmp_path / "a")
+    published.sintel(tmp_path / "a")
+    with pytest.raises(DatasetError, match="looks like KITTI 2015 and MPI Sintel"):
+        open_source(tmp_path / "a")
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "reason"),
+    [
+        ("kitti2015", "training/disp_occ_0/000003_10.png", "16-bit grey PNG"),
+        ("crestereo", "tree/0a1b_left.disp.png", "16-bit grey PNG"),
+        ("sintel", "training/disparities/alley_1/frame_0001.png", "8-bit colour PNG"),
+    ],
+)
+def test_other_encodings_are_refused(name: str, file: str, reason: str, tmp_path: Path) -> None:
+    SETS[name](tmp_path)
+    png(tmp_path / file, np.zeros((12, 40), np.uint8))
+    with pytest.raises(DatasetError, match=reason):
+        _ = open_source(tmp_path).frames("train")[0].disparity_left
+
+
+def problem_of(root: Path) -> str | None:
+    """What is said of a set's first frame, None if all of it can be read."""
+    try:
+        frame = open_source(root).frames("train")[0]
+        for attribute in ("left", "right", "disparity_left", "disparity_right", "occlusion_left"):
+            getattr(frame, attribute)
+    except DatasetError as error:
+        return str(error)
+    return None
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_damaged_files_are_sentences(name: str, tmp_path: Path) -> None:
+    """Every file cut short: an error that names it, never an array."""
+    SETS[name](tmp_path)
+    for path in [path for path in tmp_path.rglob("*") if path.is_file()]:
+        whole = path.read_bytes()
+        path.write_bytes(whole[: len(whole) // 3])
+        problem = problem_of(tmp_path)
+        if problem is None:
+            untouched = ("disp_occ_1", "_11.png", "image_0", "final", "TEST", "obj_map")
+            assert any(part in str(path) for part in untouched), path
+        else:
+            assert path.name in problem
+            assert "\n" not in problem
+        path.write_bytes(whole)
+
+
+def test_views_of_other_sizes_are_refused(tmp_path: Path) -> None:
+    published.monkaa(tmp_path)
+    png(tmp_path / "frames_cleanpass/eating_x2/right/0000.png", np.zeros((12, 41, 3), np.uint8))
+    frame = open_source(tmp_path).frames("train")[0]
+    with pytest.raises(DatasetError, match="its right image is 41x12, its left image 40x12"):
+        _ = frame.right
+
+
+def test_derived_occlusion_of_the_right_view() -> None:
+    """The mirrored world's left labels are the right labels mirrored."""
+    w = world()
+    right = derive_occlusion("right", w.disparity_right, w.disparity_left)
+    mirrored = derive_occlusion("left", w.disparity_right[:, ::-1], w.disparity_left[:, ::-1])
+    np.testing.assert_array_equal(right[:, ::-1], mirrored)
+
+
+class TestShards:
+    """Samples in tar files, at any URL."""
+
+    @staticmethod
+    def samples() -> dict[str, dict[str, dict[str, bytes]]]:
+        """Two shards of three and two samples, and one of another split."""
+        return {
+            "train-000000.tar": {f"train-0000-{i:04d}": shard_members(world(i)) for i in range(3)},
+            "train-000001.tar": {f"train-0001-{i:04d}": shard_members(world(3 + i)) for i in range(2)},
+            "val-000000.tar": {"val-0000-0000": shard_members(world(9))},
+        }
+
+    @pytest.fixture
+    def url(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+        monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+        system = fsspec.filesystem("memory")
+        folder = f"/{tmp_path.name}"
+        for name, samples in self.samples().items():
+            system.pipe_file(f"{folder}/{name}", shard(samples))
+        return f"memory:/{folder}"
+
+    def check(self, source: DataSource) -> None:
+        frames = source.frames("train")
+        assert [frame.name for frame in frames] == [
+            *(f"train-0000-{i:04d}" for i in range(3)),
+            *(f"train-0001-{i:04d}" for i in range(2)),
+        ]
+        for index in (4, 0, 2):
+            np.testing.assert_array_equal(frames[index].left, world(index).left)
+        assert [frame.name for frame in source.frames("val")] == ["val-0000-0000"]
+
+    def test_url_without_index(self, url: str) -> None:
+        self.check(open_source(f"webdataset:{url}"))
+
+    def test_url_with_index_fetches_what_is_read(self, url: str, tmp_path: Path) -> None:
+        import json
+
+        names = {name: list(samples) for name, samples in self.samples().items()}
+        fsspec.filesystem("memory").pipe_file(
+            f"{url.removeprefix('memory:/')}/index.json", json.dumps({"shards": names}).encode()
+        )
+        frames = open_source(f"webdataset:{url}").frames("train")
+        assert len(frames) == 5
+        assert not (tmp_path / "cache").exists()
+        _ = frames[4].left
+        assert [path.name for path in (tmp_path / "cache").rglob("*.tar")] == ["train-000001.tar"]
+        assert frames.groups == [3, 2]  # type: ignore[attr-defined]
+        assert frames[1:4].groups == [2, 1]  # type: ignore[attr-defined]
+        self.check(open_source(f"webdataset:{url}"))
+
+    def test_a_damaged_index_and_a_missing_bucket_are_sentences(self, url: str) -> None:
+        fsspec.filesystem("memory").pipe_file(f"{url.removeprefix('memory:/')}/index.json", b'{"shards": 3}')
+        with pytest.raises(DatasetError, match=r"index\.json: is not an index of shards"):
+            open_source(f"webdataset:{url}").frames("train")
+        with pytest.raises(
+            DatasetError, match="no frame with ground truth in the layout of WebDataset shards"
+        ):
+            open_source("webdataset:memory://nothing/here").frames("train")
+
+
+def test_frames_do_not_pile_up(tmp_path: Path) -> None:
+    """A frame keeps what it has read, the list of frames does not."""
+    published.monkaa(tmp_path)
+    frames = open_source(tmp_path).frames("train")
+    frame = frames[0]
+    assert frame.left is frame.left
+    assert frames[0] is not frame
+    assert not {"left", "disparity_left"} & vars(frames[0]).keys()
