@@ -1,0 +1,92 @@
+"""What a user may choose of the driving family."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scenes.drawing import Range
+from scenes.family import FamilyConfig
+
+Count = tuple[int, int]
+"""Smallest and largest number, both included."""
+
+
+@dataclass(frozen=True)
+class DrivingConfig(FamilyConfig):
+    """Ranges are drawn from uniformly, once a scene or once a thing as the words say."""
+
+    focal_lengths_mm: tuple[float, ...] = (15.0, 35.0)
+    """Focal lengths to choose from, on a sensor 32 mm wide."""
+    baseline_m: Range = (0.5, 1.0)
+    """Distance between the eyes; made smaller where the road would come nearer than allowed."""
+    largest_disparity_share: float = 0.2
+    """Nothing in view has a larger disparity, as a share of the image width: 192 px at 960."""
+    clearance_m: float = 1.0
+    """Distance that everything but the road keeps from both eyes at all times."""
+    camera_height_m: Range = (1.4, 2.2)
+    """Height of the eyes above the road."""
+    pitch_deg: Range = (-3.0, 5.0)
+    """How far the camera looks down."""
+    roll_deg: Range = (-2.0, 2.0)
+    """How far the camera leans."""
+    yaw_deg: Range = (-6.0, 6.0)
+    """How far the camera looks aside from the street's direction."""
+    slow_m: Range = (0.15, 0.5)
+    """Metres per frame of a slow drive."""
+    fast_m: Range = (0.7, 1.6)
+    """Metres per frame of a fast drive (1.4 is 50 km/h at 10 frames per second)."""
+    fast_share: float = 0.5
+    """How many scenes are driven fast."""
+    backwards_share: float = 0.5
+    """How many scenes are driven backwards."""
+    left_hand_share: float = 0.4
+    """How many scenes have traffic that keeps to the left."""
+    straight_share: float = 0.25
+    """How many streets are straight."""
+    bend_deg: Range = (6.0, 32.0)
+    """How much a winding street may turn within 50 m."""
+    view_m: Range = (100.0, 170.0)
+    """How far the street goes on before the camera."""
+    lanes: Count = (1, 2)
+    """Lanes in each direction."""
+    lane_m: Range = (2.9, 3.6)
+    """Width of a lane."""
+    pavement_m: Range = (1.8, 4.5)
+    """Width of each pavement."""
+    kerb_m: Range = (0.08, 0.16)
+    """Height of the kerbs."""
+    headway_m: Range = (7.0, 60.0)
+    """Mean gap between the vehicles of a lane, drawn once a lane."""
+    parked_share: Range = (0.0, 0.9)
+    """How many of the parking places of a side are taken."""
+    large_vehicle_share: Range = (0.05, 0.4)
+    """How many vehicles are vans, lorries or buses."""
+    pedestrians_per_100m: Range = (0.0, 18.0)
+    """People on each pavement."""
+    tree_spacing_m: Range = (7.0, 18.0)
+    """Distance between the trees of a row."""
+    lamp_spacing_m: Range = (18.0, 34.0)
+    """Distance between the lamp posts of a row."""
+    furniture_per_100m: Range = (2.0, 16.0)
+    """Signs, bins, bollards, benches, cabinets, shelters on each pavement."""
+    dusk_share: float = 0.2
+    """How many scenes are lit by the last of the daylight and by street lamps."""
+    overcast_share: float = 0.35
+    """How many of the other scenes have no hard shadows."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if isinstance(value, tuple) and name != "focal_lengths_mm" and value[0] > value[1]:
+                raise ValueError(f"driving: {name} must be (low, high), got {value}")
+            if name.endswith("_share") and isinstance(value, float) and not 0.0 <= value <= 1.0:
+                raise ValueError(f"driving: {name} must be within 0..1, got {value}")
+        positive = ("baseline_m", "camera_height_m", "lane_m", "pavement_m", "kerb_m", "headway_m", "view_m")
+        for name in (*positive, "tree_spacing_m", "lamp_spacing_m", "lanes"):
+            if getattr(self, name)[0] <= 0:
+                raise ValueError(f"driving: {name} must be above 0, got {getattr(self, name)}")
+        if not self.focal_lengths_mm or min(self.focal_lengths_mm) <= 0:
+            raise ValueError(f"driving: focal_lengths_mm must be above 0, got {self.focal_lengths_mm}")
+        if self.largest_disparity_share <= 0:
+            raise ValueError("driving: largest_disparity_share must be above 0")
+        if self.frames < 1:
+            raise ValueError(f"driving: frames must be at least 1, got {self.frames}")

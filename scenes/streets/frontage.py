@@ -1,0 +1,296 @@
+"""What lines the street: rows of houses by district, gardens, fences, the skyline behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenes.drawing import Range, chance, choose, integer, uniform
+from scenes.shapes.buildings import (
+    CityBlock,
+    HouseDesign,
+    HouseRoof,
+    HouseTrim,
+    HouseWalls,
+    HouseWindows,
+    ShopFront,
+)
+from scenes.metric import standing
+from scenes.motion import vector
+from scenes.shapes.road import Course
+from scenes.shapes.street_furniture import Fence
+from scenes.shapes.street_plants import Hedge, Shrub
+from scenes.streets import finishes
+from scenes.streets.assembly import Assembly, by_the_street
+
+
+@dataclass(frozen=True)
+class District:
+    """What one side of a street is like."""
+
+    share: float
+    """How many sides of streets are of this kind, relative to the others."""
+    houses: tuple[str, ...]
+    """Kinds of `HouseDesign`; none for open land."""
+    setback_m: Range
+    """Depth of the front gardens."""
+    gap_m: Range
+    """Between houses."""
+    plastered: float
+    """Share of walls that are plaster, not brick."""
+    trees: float
+    """How many of the sides have a row of trees on the pavement."""
+    boundary: tuple[str, ...] = ()
+    """What may stand between pavement and garden: kinds of `Fence`, or hedge."""
+
+
+DISTRICTS: dict[str, District] = {
+    "centre": District(0.24, ("city",), (0.0, 0.0), (0.06, 0.06), 0.6, 0.35),
+    "offices": District(0.12, ("office", "city"), (0.0, 4.0), (0.06, 8.0), 0.8, 0.5),
+    "terraces": District(
+        0.24, ("terrace",), (0.0, 3.5), (0.06, 0.06), 0.35, 0.25, ("railing", "wall", "hedge", "picket")
+    ),
+    "suburb": District(
+        0.2,
+        ("detached", "terrace"),
+        (3.0, 8.0),
+        (2.5, 9.0),
+        0.5,
+        0.4,
+        ("hedge", "picket", "wall", "boards", "mesh"),
+    ),
+    "works": District(
+        0.08, ("hall", "office"), (2.0, 10.0), (4.0, 14.0), 0.5, 0.15, ("mesh", "boards", "wall")
+    ),
+    "park": District(0.12, (), (6.0, 12.0), (0.0, 0.0), 0.0, 0.9, ("railing", "hedge", "wall", "mesh")),
+}
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of the street in street coordinates; `sign` is 1 on the left, -1 on the right."""
+
+    sign: float
+    district: District
+    kerb_m: float
+    """Distance of the kerb from the street's middle."""
+    edge_m: float
+    """Distance of the pavement's far edge."""
+    front_m: float
+    """Distance of the house fronts."""
+    parking: bool
+    """Whether a parking lane runs along the kerb."""
+
+    def turn_deg(self) -> float:
+        """The turn at which a thing's y axis points away from the street."""
+        return 0.0 if self.sign > 0 else 180.0
+
+
+@dataclass(frozen=True)
+class _Style:
+    """A house design with the materials it is built of."""
+
+    design: HouseDesign
+    trim: int
+    upper: int
+    ground: int
+    roof: int
+    shop: ShopFront | None
+    board: int
+
+
+def add_houses(
+    rng: np.random.Generator, scene: Assembly, course: Course, side: Side, start_m: float, lit: float
+) -> None:
+    """A row of houses along one side, of a few designs, each house with its own wall."""
+    district = side.district
+    if not district.houses:
+        return
+    walls = [scene.material(finishes.wall(rng, district.plastered)) for _ in range(integer(rng, 2, 3))]
+    styles = [_sample_style(rng, scene, district, lit) for _ in range(integer(rng, 2, 3))]
+    gap_m = uniform(rng, *district.gap_m)
+    s, number = start_m + uniform(rng, 0.0, 8.0), 0
+    while True:
+        style = choose(rng, styles)
+        step_m, back_m = _room_for(course, side, s, style.design)
+        if s + step_m > course.end_m - 4.0:
+            return
+        _add_house(
+            scene,
+            f"house {'LR'[side.sign < 0]}{number}",
+            style,
+            choose(rng, walls),
+            course,
+            side,
+            s + step_m / 2,
+            back_m,
+        )
+        s += step_m + gap_m * (uniform(rng, 0.6, 1.4) if gap_m > 1.0 else 1.0)
+        number += 1
+
+
+def _room_for(course: Course, side: Side, s_m: float, design: HouseDesign) -> tuple[float, float]:
+    """How much of the street a house needs, and how far its straight front must stand back from a bend."""
+    ahead = np.linspace(s_m, s_m + 1.6 * design.width, 12)
+    curvature = np.gradient(course.heading(ahead), ahead)
+    # The street's length at a distance from its middle, for each metre along its middle.
+    front = 1 - curvature * side.sign * side.front_m
+    back = 1 - curvature * side.sign * (side.front_m + design.depth + 1.0)
+    step_m = (design.width + 0.06) / float(min(front.min(), back.min()))
+    return step_m, float(np.abs(curvature).max()) * design.width**2 / 8
+
+
+def _sample_style(rng: np.random.Generator, scene: Assembly, district: District, lit: float) -> _Style:
+    design = HouseDesign.sample(rng, choose(rng, district.houses))
+    frame = finishes.WINDOW_FRAMES[integer(rng, 0, len(finishes.WINDOW_FRAMES) - 1)]
+    upper = scene.material(finishes.windows(rng, design, frame, lit))
+    shop = None
+    if design.shop:
+        front = ShopFront.sample(rng)
+        shop = replace(front, width=design.width, height=design.ground_floor - 0.72)
+    return _Style(
+        design=design,
+        trim=scene.material(finishes.trim(rng)),
+        upper=upper,
+        ground=scene.material(finishes.shop_window(rng, lit)) if design.shop else upper,
+        roof=scene.material(finishes.roof(rng)),
+        shop=shop,
+        board=scene.material(finishes.shop_board(rng)) if shop else upper,
+    )
+
+
+def _add_house(
+    scene: Assembly,
+    name: str,
+    style: _Style,
+    wall: int,
+    course: Course,
+    side: Side,
+    s_m: float,
+    back_m: float,
+) -> None:
+    design = style.design
+    parts = [
+        ("walls", HouseWalls(design), wall),
+        ("trim", HouseTrim(design), style.trim),
+        ("ground floor windows", HouseWindows(design, ground=True), style.ground),
+        ("roof", HouseRoof(design), style.roof),
+    ]
+    if design.floors > 1:
+        parts.append(("windows", HouseWindows(design, ground=False), style.upper))
+    if style.shop:
+        parts.append(("shop front", style.shop, style.board))
+    t = side.sign * (side.front_m + back_m)
+    # The design's origin is the front's end; the place asked for is its middle.
+    middle = course.point(s_m, t)
+    along = course.facing(s_m, side.turn_deg()).apply((design.width / 2, 0.0, 0.0))[:2]
+    (origin_s, origin_t) = course.locate((middle - along)[None])[0]
+    turn = side.turn_deg() + float(np.degrees(course.heading(s_m) - course.heading(float(origin_s))))
+    scene.add(*by_the_street(name, parts, course, float(origin_s), float(origin_t), turn_deg=turn))
+
+
+def add_boundary(
+    rng: np.random.Generator, scene: Assembly, course: Course, side: Side, start_m: float, end_m: float
+) -> None:
+    """Fences, walls or hedges between the pavement and what lies behind, with gaps for gates."""
+    if side.front_m - side.edge_m < 1.5 or not side.district.boundary:
+        return
+    kind = choose(rng, side.district.boundary)
+    panel: Fence | Hedge
+    if kind == "hedge":
+        panel, material = Hedge.sample(rng), scene.material(finishes.foliage(rng))
+    else:
+        panel = Fence.sample(rng)
+        while panel.kind != kind:
+            panel = Fence.sample(rng)
+        material = scene.material(
+            finishes.wall(rng, 0.3)
+            if kind == "wall"
+            else finishes.wood(rng)
+            if kind == "boards"
+            else finishes.metal_paint(rng)
+        )
+    inset = panel.width / 2 + 0.05 if isinstance(panel, Hedge) else 0.2
+    t = side.sign * (side.edge_m + inset)
+    s, number = start_m, 0
+    while s + panel.length < end_m:
+        step = panel.length / (1 - side.sign * side.edge_m * _curvature(course, s))
+        if not chance(rng, 0.12):
+            middle = s + step / 2 if isinstance(panel, Hedge) else s
+            turn = np.degrees(float(course.heading(s + step / 2) - course.heading(middle)))
+            parts = [("", panel, material)]
+            scene.add(
+                *by_the_street(
+                    f"fence {'LR'[side.sign < 0]}{number}", parts, course, middle, t, turn_deg=float(turn)
+                )
+            )
+        s += step
+        number += 1
+
+
+def _curvature(course: Course, s_m: float) -> float:
+    return float(course.heading(s_m + 2.0) - course.heading(s_m)) / 2.0
+
+
+def add_garden(
+    rng: np.random.Generator, scene: Assembly, course: Course, side: Side, start_m: float, end_m: float
+) -> None:
+    """Shrubs in front gardens and parks."""
+    depth = side.front_m - side.edge_m
+    if depth < 2.5:
+        return
+    kinds = [Shrub.sample(rng) for _ in range(2)]
+    leaves = scene.material(finishes.foliage(rng))
+    for number in range(integer(rng, 0, 10)):
+        shrub = choose(rng, kinds)
+        s, t = uniform(rng, start_m, end_m), side.sign * (side.edge_m + uniform(rng, 1.3, depth - 0.9))
+        scene.add(
+            *by_the_street(
+                f"shrub {'LR'[side.sign < 0]}{number}",
+                [("", shrub, leaves)],
+                course,
+                s,
+                t,
+                turn_deg=uniform(rng, 0.0, 360.0),
+            )
+        )
+
+
+def add_skyline(rng: np.random.Generator, scene: Assembly, course: Course, sides: tuple[Side, Side]) -> None:
+    """Large plain buildings behind the rows and across the end of the street."""
+    materials = [scene.material(finishes.skyline(rng)) for _ in range(integer(rng, 2, 3))]
+    far_m = course.end_m
+    for number in range(integer(rng, 6, 16)):
+        ahead = chance(rng, 0.35)
+        s = far_m + uniform(rng, 15.0, 120.0) if ahead else uniform(rng, 30.0, far_m)
+        side = choose(rng, sides)
+        aside = uniform(rng, 0.0, 60.0) if ahead else side.front_m + uniform(rng, 45.0, 140.0)
+        block = CityBlock.sample(rng)
+        _add_block(
+            scene,
+            f"block {number}",
+            course,
+            s,
+            side.sign * aside,
+            block,
+            uniform(rng, -30.0, 30.0),
+            choose(rng, materials),
+        )
+
+
+def _add_block(
+    scene: Assembly,
+    name: str,
+    course: Course,
+    s_m: float,
+    t_m: float,
+    block: CityBlock,
+    turn_deg: float,
+    material: int,
+) -> None:
+    """Beyond the street's end things stand along its straight continuation."""
+    end = min(s_m, course.end_m)
+    ahead = course.facing(end).apply((max(0.0, s_m - course.end_m), 0.0, 0.0))
+    place = vector(np.array(course.place(end, t_m)) + ahead)
+    scene.add(standing(name, block, material, [place], [course.facing(end, turn_deg)]))

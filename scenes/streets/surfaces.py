@@ -1,0 +1,194 @@
+"""The ground: carriageway, paint, kerbs, pavements, gardens, the land beyond."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from scenes.drawing import chance, integer, uniform
+from scenes.metric import MetricShape, standing
+from scenes.shapes.road import Course, Field, Kerb, RoadPaint, RoadStrip, Stripe
+from scenes.streets import finishes
+from scenes.streets.assembly import Assembly
+from scenes.streets.config import DrivingConfig
+from scenes.streets.frontage import Side
+from scenes.streets.rig import Drive
+
+_LAND_M = 900.0
+"""How far the land reaches around the street."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What the rest of the scene needs to know of the ground."""
+
+    crossings: tuple[float, ...]
+    """s of the middles of the zebra crossings."""
+    pavement_m: float
+    """Height of the pavements above the road's edge."""
+
+
+def lay_ground(
+    rng: np.random.Generator, scene: Assembly, config: DrivingConfig, drive: Drive, sides: tuple[Side, Side]
+) -> Ground:
+    """Everything underfoot."""
+    course = drive.course
+    left, right = sides
+    road = (left.kerb_m, -right.kerb_m, uniform(rng, 0.0, 0.06))
+    kerb_height = uniform(rng, *config.kerb_m)
+    crossings = _crossings(rng)
+    tarmac = scene.material(finishes.asphalt(rng))
+    _lay(
+        scene,
+        "road",
+        RoadStrip(course, course.start_m, course.end_m, road[0], road[1], 0.0, 0.4, road[2]),
+        tarmac,
+    )
+    _paint(rng, scene, drive, road, crossings)
+    _repairs(rng, scene, course, road)
+    stone, paving = scene.material(finishes.kerb_stone(rng)), scene.material(finishes.pavement(rng))
+    lawn = scene.material(finishes.grass(rng))
+    for side in sides:
+        name = "left" if side.sign > 0 else "right"
+        width = uniform(rng, 0.12, 0.3) * side.sign
+        kerb = Kerb(course, course.start_m, course.end_m, side.sign * side.kerb_m, width, kerb_height, 2.0)
+        _lay(scene, f"{name} kerb", kerb, stone)
+        inner, outer = side.sign * (side.kerb_m + abs(width) / 2), side.sign * side.edge_m
+        top = kerb_height - 0.006
+        _lay(scene, f"{name} pavement", _strip(course, inner, outer, top), paving)
+        reach = side.sign * (side.front_m + 22.0)
+        _lay(
+            scene,
+            f"{name} land",
+            _strip(course, outer - 0.05 * side.sign, reach, top - 0.02),
+            _land(rng, side, lawn, paving),
+        )
+    _lay(scene, "plain", Field(course.start_m - _LAND_M, course.end_m + _LAND_M, _LAND_M, -0.3), lawn)
+    return Ground(crossings, kerb_height - 0.006)
+
+
+def _lay(scene: Assembly, name: str, shape: MetricShape, material: int) -> None:
+    """A shape whose coordinates are the world's."""
+    scene.add(standing(name, shape, material, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
+
+
+def _strip(course: Course, one_m: float, other_m: float, top_m: float) -> RoadStrip:
+    return RoadStrip(
+        course, course.start_m, course.end_m, max(one_m, other_m), min(one_m, other_m), top_m, 0.5
+    )
+
+
+def _land(rng: np.random.Generator, side: Side, lawn: int, paving: int) -> int:
+    """What front gardens and the space between houses are covered with."""
+    garden = side.front_m - side.edge_m > 1.5
+    return lawn if garden and not chance(rng, 0.2) else paving
+
+
+def _crossings(rng: np.random.Generator) -> tuple[float, ...]:
+    """One or two zebra crossings in half of the streets."""
+    if not chance(rng, 0.55):
+        return ()
+    first = uniform(rng, 9.0, 40.0)
+    return (first,) if chance(rng, 0.6) else (first, first + uniform(rng, 40.0, 80.0))
+
+
+def _paint(
+    rng: np.random.Generator,
+    scene: Assembly,
+    drive: Drive,
+    road: tuple[float, float, float],
+    crossings: tuple[float, ...],
+) -> None:
+    course = drive.course
+    half = uniform(rng, 0.05, 0.08)
+    stripes: list[Stripe] = []
+    centre: list[Stripe] = []
+    dash, gap = uniform(rng, 2.0, 4.5), uniform(rng, 2.5, 7.0)
+    inner = [k * drive.lane_m for k in range(1, len(drive.lanes) // 2)]
+    for t in [*inner, *[-t for t in inner]]:
+        stripes += _dashes(course, t, half, dash, gap)
+    style = rng.choice(["dashed", "solid", "double"], p=[0.55, 0.25, 0.2])
+    if style == "dashed":
+        centre += _dashes(course, 0.0, half, dash, gap)
+    else:
+        offsets = (0.0,) if style == "solid" else (-0.14, 0.14)
+        centre += [Stripe(course.start_m, course.end_m, t + half, t - half) for t in offsets]
+    if chance(rng, 0.6) or road[0] > drive.half_road_m + 0.5:
+        for edge, sign in ((road[0], 1.0), (road[1], -1.0)):
+            t = sign * (drive.half_road_m if abs(edge) > drive.half_road_m + 0.5 else abs(edge) - 0.25)
+            stripes.append(Stripe(course.start_m, course.end_m, t + half, t - half))
+    for middle in crossings:
+        stripes += _zebra(rng, drive, road, middle)
+    yellow = chance(rng, 0.25)
+    white = scene.material(finishes.road_paint(rng))
+    centre = [piece for stripe in centre for piece in _interrupted(stripe, crossings)]
+    stripes = [piece for stripe in stripes for piece in _interrupted(stripe, crossings)]
+    groups = [
+        ("centre line", centre, scene.material(finishes.road_paint(rng, True)) if yellow else white),
+        ("markings", stripes, white),
+    ]
+    for name, items, material in groups:
+        if items:
+            _lay(scene, name, RoadPaint(course, tuple(items), road), material)
+
+
+def _dashes(course: Course, t_m: float, half_m: float, dash_m: float, gap_m: float) -> list[Stripe]:
+    starts = np.arange(course.start_m + 1.0, course.end_m - dash_m, dash_m + gap_m)
+    return [Stripe(s, s + dash_m, t_m + half_m, t_m - half_m) for s in starts.tolist()]
+
+
+def _zebra(
+    rng: np.random.Generator, drive: Drive, road: tuple[float, float, float], middle_m: float
+) -> list[Stripe]:
+    """Bars along the street from kerb to kerb, and a stop line before them on each side."""
+    long, wide = uniform(rng, 1.3, 2.0), uniform(rng, 0.4, 0.6)
+    edges = np.arange(road[1] + 0.35, road[0] - 0.35 - wide, 2 * wide)
+    bars = [Stripe(middle_m - long, middle_m + long, t + wide, t) for t in edges.tolist()]
+    for sign in (1.0, -1.0):
+        s = middle_m - sign * (long + 1.2)
+        side = sign * (1.0 if drive.keep_left else -1.0)
+        reach = side * (drive.half_road_m - 0.2)
+        bars.append(Stripe(s - 0.2, s + 0.2, max(0.15 * side, reach), min(0.15 * side, reach)))
+    return bars
+
+
+def _interrupted(stripe: Stripe, crossings: tuple[float, ...]) -> list[Stripe]:
+    """A line without what would run through a crossing; the crossing's own bars stay whole."""
+    pieces = [stripe]
+    for middle in crossings:
+        if abs((stripe.from_m + stripe.to_m) / 2 - middle) < 3.5 and stripe.to_m - stripe.from_m < 4.2:
+            if abs(stripe.left_m - stripe.right_m) < 0.2:
+                return []
+            continue
+        low, high = middle - 3.6, middle + 3.6
+        cut = []
+        for piece in pieces:
+            if piece.to_m <= low or piece.from_m >= high:
+                cut.append(piece)
+                continue
+            if piece.from_m < low - 0.5:
+                cut.append(Stripe(piece.from_m, low, piece.left_m, piece.right_m))
+            if piece.to_m > high + 0.5:
+                cut.append(Stripe(high, piece.to_m, piece.left_m, piece.right_m))
+        pieces = cut
+    return pieces
+
+
+def _repairs(
+    rng: np.random.Generator, scene: Assembly, course: Course, road: tuple[float, float, float]
+) -> None:
+    """Patches of newer tarmac, seams and covers; thinner than the road paint, which runs over them."""
+    patches = []
+    for _ in range(integer(rng, 0, 9)):
+        s, t = uniform(rng, course.start_m, course.end_m - 12.0), uniform(rng, road[1] + 1.5, road[0] - 1.5)
+        long, wide = (
+            (uniform(rng, 4.0, 12.0), 0.4)
+            if chance(rng, 0.4)
+            else (uniform(rng, 0.5, 3.0), uniform(rng, 0.3, 1.1))
+        )
+        patches.append(Stripe(s, s + long, t + wide, t - wide, shear=uniform(rng, -0.2, 0.2)))
+    if patches:
+        shape = RoadPaint(course, tuple(patches), road, thickness_m=0.003)
+        _lay(scene, "repairs", shape, scene.material(finishes.tiled(finishes.Asphalt.sample(rng, 256), 2.3)))

@@ -1,0 +1,275 @@
+"""Moving and parked vehicles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from scenes.drawing import chance, choose, uniform
+from scenes.metric import MetricShape, standing
+from scenes.painting import Srgb
+from scenes.shapes.road import Course
+from scenes.shapes.vehicles import (
+    CarBody,
+    CarDesign,
+    CarGlass,
+    CarLamps,
+    CarTrim,
+    CargoBox,
+    VanBody,
+    VanDesign,
+    VanGlass,
+    VanLamps,
+    VanTrim,
+    Wheel,
+)
+from scenes.spec import SceneObject
+from scenes.streets import finishes
+from scenes.streets.assembly import Assembly
+from scenes.streets.config import DrivingConfig
+from scenes.streets.frontage import Side
+from scenes.streets.rig import Drive, Lane
+
+PARKING_M = 2.15
+"""Width of a parking lane."""
+_KEY_M = 4.0
+"""Key poses of a moving vehicle are at most this far apart."""
+_TURN_KEY = 2.0
+"""Key poses of a turning wheel are at most this far apart, radians."""
+_CAR_KINDS = ("hatchback", "hatchback", "saloon", "estate", "suv", "suv")
+
+
+@dataclass(frozen=True)
+class Model:
+    """A make of vehicle: its parts with the materials all of its kind share, its wheels."""
+
+    length: float
+    parts: tuple[tuple[str, MetricShape, int], ...]
+    painted: tuple[tuple[str, MetricShape], ...]
+    """Parts that wear each vehicle's own paint."""
+    wheel: Wheel
+    wheel_material: int
+    wheels: tuple[tuple[float, float], ...]
+    """x and y of each."""
+    paint: Callable[[np.random.Generator], int]
+
+
+@dataclass
+class Fleet:
+    """The makes of vehicle a scene has; few, so that they share their meshes."""
+
+    cars: list[Model]
+    large: list[Model]
+    large_share: float
+
+    def draw(self, rng: np.random.Generator) -> Model:
+        return choose(rng, self.large if self.large and chance(rng, self.large_share) else self.cars)
+
+
+def sample_fleet(rng: np.random.Generator, scene: Assembly, config: DrivingConfig, lit: bool) -> Fleet:
+    shared = {
+        "glass": scene.material(finishes.car_glass(rng)),
+        "trim": scene.material(finishes.black_plastic()),
+        "head": scene.material(finishes.lamp((235, 240, 245), 4.0 if lit else 0.0)),
+        "tail": scene.material(finishes.lamp((170, 16, 18), 1.5 if lit else 0.0)),
+    }
+    paints = [scene.material(finishes.car_paint(rng)) for _ in range(9)]
+    cars = [_car_model(rng, scene, shared, paints) for _ in range(4)]
+    large = [
+        _van_model(rng, scene, shared, paints, kind)
+        for kind in ("van", choose(rng, ["van", "lorry"]), choose(rng, ["lorry", "bus"]))
+    ]
+    return Fleet(cars, large, uniform(rng, *config.large_vehicle_share))
+
+
+def _car_model(rng: np.random.Generator, scene: Assembly, shared: dict[str, int], paints: list[int]) -> Model:
+    design = CarDesign.sample(rng, choose(rng, _CAR_KINDS))
+    wheel = Wheel(design.wheel_radius, uniform(rng, 0.19, 0.23), 0.66)
+    return Model(
+        length=design.length,
+        parts=(
+            ("glass", CarGlass(design), shared["glass"]),
+            ("trim", CarTrim(design), shared["trim"]),
+            ("head lamps", CarLamps(design, rear=False), shared["head"]),
+            ("tail lamps", CarLamps(design, rear=True), shared["tail"]),
+        ),
+        painted=(("body", CarBody(design)),),
+        wheel=wheel,
+        wheel_material=scene.material(finishes.wheel(rng, wheel.radius, wheel.width)),
+        wheels=tuple((x, side * design.track) for x in design.axles for side in (1.0, -1.0)),
+        paint=lambda rng: choose(rng, paints),
+    )
+
+
+def _van_model(
+    rng: np.random.Generator, scene: Assembly, shared: dict[str, int], paints: list[int], kind: str
+) -> Model:
+    design = VanDesign.sample(rng, kind)
+    wheel = Wheel(design.wheel_radius, 0.23 if kind == "van" else 0.3, 0.66)
+    parts: list[tuple[str, MetricShape, int]] = [
+        ("glass", VanGlass(design), shared["glass"]),
+        ("trim", VanTrim(design), shared["trim"]),
+        ("head lamps", VanLamps(design, rear=False), shared["head"]),
+        ("tail lamps", VanLamps(design, rear=True), shared["tail"]),
+    ]
+    own = list(paints)
+    if kind == "lorry":
+        parts.append(("box", CargoBox(design), scene.material(finishes.lettering(rng, _livery(rng)))))
+    elif kind == "bus" or chance(rng, 0.4):
+        own = [scene.material(finishes.lettering(rng, _livery(rng)))]
+    elif chance(rng, 0.5):
+        own = [scene.material(finishes.plain((228, 228, 224), roughness=0.25, specular=0.5))]
+    return Model(
+        length=design.length,
+        parts=tuple(parts),
+        painted=(("body", VanBody(design)),),
+        wheel=wheel,
+        wheel_material=scene.material(finishes.wheel(rng, wheel.radius, wheel.width)),
+        wheels=tuple((x, side * design.track) for x in design.axles for side in (1.0, -1.0)),
+        paint=lambda rng: choose(rng, own),
+    )
+
+
+def _livery(rng: np.random.Generator) -> Srgb:
+    light = uniform(rng, 0.4, 0.95)
+    return finishes.shade(light, uniform(rng, 0.0, 0.16), uniform(rng, 0.0, 360.0))
+
+
+def _vehicle(
+    rng: np.random.Generator,
+    name: str,
+    model: Model,
+    course: Course,
+    s_m: tuple[float, ...],
+    t_m: float,
+    turn_deg: float,
+    times: tuple[float, ...],
+) -> tuple[SceneObject, ...]:
+    """A vehicle that stands at one place or passes through several at the given times."""
+    places = [course.place(s, t_m) for s in s_m]
+    turns = [course.facing(s, turn_deg) for s in s_m]
+    paint = model.paint(rng)
+    parts = [*model.parts, *[(part, shape, paint) for part, shape in model.painted]]
+    objects = [
+        standing(f"{name} {part}", shape, material, places, turns, times) for part, shape, material in parts
+    ]
+    forward = 1.0 if turn_deg == 0.0 else -1.0
+    start = uniform(rng, 0.0, 2 * math.pi)
+    for number, (x, y) in enumerate(model.wheels):
+        rolled = _rolling(model.wheel.radius, s_m, times, forward, start)
+        spots, attitudes = [], []
+        for time, angle in zip(*rolled, strict=True):
+            s = float(np.interp(time, times, s_m))
+            facing = course.facing(s, turn_deg)
+            foot = np.array(course.place(s, t_m))
+            hub = foot + facing.apply((x, y, model.wheel.radius))
+            spots.append((float(hub[0]), float(hub[1]), float(hub[2])))
+            attitudes.append(facing * Rotation.from_euler("Y", angle))
+        objects.append(
+            standing(f"{name} wheel {number}", model.wheel, model.wheel_material, spots, attitudes, rolled[0])
+        )
+    return tuple(objects)
+
+
+def _rolling(
+    radius_m: float, s_m: tuple[float, ...], times: tuple[float, ...], forward: float, start: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Key times and angles of a wheel that rolls without slipping; the path's own keys are among them."""
+    if len(times) == 1:
+        return times, (start,)
+    turn = abs(s_m[-1] - s_m[0]) / radius_m
+    each = max(1, math.ceil(turn / (len(times) - 1) / _TURN_KEY))
+    fine = np.linspace(times[0], times[-1], each * (len(times) - 1) + 1)
+    angle = start + forward * (np.interp(fine, times, s_m) - s_m[0]) / radius_m
+    return tuple(fine.tolist()), tuple(angle.tolist())
+
+
+def add_moving(
+    rng: np.random.Generator, scene: Assembly, config: DrivingConfig, drive: Drive, fleet: Fleet
+) -> None:
+    """Vehicles in all lanes, those of a lane at one speed, so that they keep their distances."""
+    for number, lane in enumerate(drive.lanes):
+        own = lane == drive.lane
+        speed = (
+            abs(drive.speed_m)
+            if own
+            else abs(drive.speed_m) * uniform(rng, 0.4, 1.5) + uniform(rng, 0.0, 0.2)
+        )
+        if not own and chance(rng, 0.15):
+            speed = 0.0  # a queue
+        _add_lane(rng, scene, drive, lane, fleet, speed, uniform(rng, *config.headway_m), f"car {number}")
+
+
+def _add_lane(
+    rng: np.random.Generator,
+    scene: Assembly,
+    drive: Drive,
+    lane: Lane,
+    fleet: Fleet,
+    speed_m: float,
+    headway_m: float,
+    name: str,
+) -> None:
+    course = drive.course
+    travel = speed_m * (drive.frames + 1) / 2
+    low, high = course.start_m + 2.0, course.end_m - 2.0
+    turn = 0.0 if lane.direction > 0 else 180.0
+    s = low + uniform(rng, 0.0, headway_m)
+    number = 0
+    while True:
+        model = fleet.draw(rng)
+        middle = s + model.length / 2
+        s += model.length + 2.0 + headway_m * uniform(rng, 0.3, 1.7)
+        if middle + model.length / 2 + travel > high:
+            return
+        if middle - model.length / 2 - travel < low:
+            continue
+        if lane == drive.lane and -9.0 < middle - math.copysign(model.length / 2, middle) < 5.0:
+            continue  # the rig's own place
+        aside = uniform(rng, -0.2, 0.2)
+        if speed_m == 0.0:
+            path, times = (middle,), (0.0,)
+        else:
+            count = 2 + math.floor(2 * travel / _KEY_M)
+            times = tuple(np.linspace(-1.0, float(drive.frames), count).tolist())
+            path = tuple((middle + lane.direction * np.linspace(-travel, travel, count)).tolist())
+        scene.add(*_vehicle(rng, f"{name}.{number}", model, course, path, lane.t_m + aside, turn, times))
+        number += 1
+
+
+def add_parked(
+    rng: np.random.Generator,
+    scene: Assembly,
+    config: DrivingConfig,
+    drive: Drive,
+    side: Side,
+    fleet: Fleet,
+    crossings: tuple[float, ...],
+) -> None:
+    """Vehicles along the kerb of a side with a parking lane."""
+    if not side.parking:
+        return
+    taken = uniform(rng, *config.parked_share)
+    with_traffic = (side.sign > 0) == drive.keep_left
+    s, number = drive.course.start_m + 3.0, 0
+    while True:
+        model = fleet.draw(rng)
+        if model.length > 7.0:
+            continue
+        middle = s + model.length / 2
+        if middle + model.length / 2 > drive.course.end_m - 2.0:
+            return
+        s += model.length + uniform(rng, 0.7, 1.8)
+        if any(abs(middle - crossing) < 5.0 + model.length / 2 for crossing in crossings) or not chance(
+            rng, taken
+        ):
+            continue
+        t = side.sign * (side.kerb_m - PARKING_M / 2 + uniform(rng, -0.08, 0.08))
+        turn = 0.0 if with_traffic != chance(rng, 0.12) else 180.0
+        name = f"parked {'LR'[side.sign < 0]}{number}"
+        scene.add(*_vehicle(rng, name, model, drive.course, (middle,), t, turn, (0.0,)))
+        number += 1

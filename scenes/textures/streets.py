@@ -1,0 +1,557 @@
+"""Pictures of streets: asphalt, paving, plaster, windows, roof tiles, leaves, bark, signs, wheels.
+
+All are drawn by the driving family alone: each belongs on one kind of surface, at one scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.drawing import chance, choose, integer, new_seed, uniform
+from scenes.painting import (
+    Field,
+    Palette,
+    Picture,
+    Srgb,
+    colorize,
+    finish,
+    flat_colors,
+    mix,
+    oklch_to_srgb,
+    paint,
+    smooth_step,
+    spectral_noise,
+    to_unit,
+    unit_grid,
+)
+from scenes.spec import Texture
+from scenes.textures.cells import nearest_seeds
+
+
+def shade(lightness: float, chroma: float, hue_deg: float) -> Srgb:
+    """An sRGB colour by perceptual lightness 0..1, chroma 0..0.3 and hue (30 red, 100 yellow, 140 green)."""
+    (rgb,) = oklch_to_srgb(np.array([lightness]), np.array([chroma]), np.radians([hue_deg]))
+    return (int(rgb[0]), int(rgb[1]), int(rgb[2]))
+
+
+@dataclass(frozen=True)
+class Asphalt(Texture):
+    """Bitumen with stones in it, darker and lighter patches, cracks, some sealed with tar."""
+
+    size: int
+    seed: int
+    tone: Srgb
+    stones: float
+    """Contrast of the grit, standard deviation relative to the tone."""
+    patches: float
+    """Contrast of the slow variation."""
+    cracks: float
+    """Share of the cells' borders that have broken open, 0..1."""
+    cells: int
+    """Slabs between cracks along one side."""
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            tone=shade(uniform(rng, 0.36, 0.58), uniform(rng, 0.0, 0.02), uniform(rng, 20.0, 280.0)),
+            stones=uniform(rng, 0.1, 0.22),
+            patches=uniform(rng, 0.04, 0.12),
+            cracks=uniform(rng, 0.0, 0.6),
+            cells=integer(rng, 2, 4),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        grit = spectral_noise(rng, self.size, 0.15, self.size / 12)
+        slow = spectral_noise(rng, self.size, 1.3, 1)
+        light = 1 + np.float32(self.stones) * grit + np.float32(self.patches) * slow
+        x, y = unit_grid(self.size)
+        bend = np.float32(0.06) * spectral_noise(rng, self.size, 1.4, 3)
+        _, first, second = nearest_seeds(rng, x + bend, y - bend, self.cells, 0.9)
+        broken = smooth_step(
+            slow + np.float32(0.7) * np.roll(slow, self.size // 3, 0), 1.2 - 2 * self.cracks, 0.8
+        )
+        crack = (1 - smooth_step(second - first, 0.02, 0.02)) * broken * np.float32(self.cracks > 0.1)
+        picture = paint(self.tone) * (np.clip(light, 0.25, 2.0) * (1 - np.float32(0.6) * crack))
+        return finish(picture, rng, 0.06)
+
+
+@dataclass(frozen=True)
+class Paving(Texture):
+    """Slabs or blocks with joints, each of its own tone: pavements, driveways, garden walls' coping."""
+
+    size: int
+    seed: int
+    palette: Palette
+    rows: int
+    """Courses per picture; even."""
+    columns: int
+    bond: float
+    """Shift of every other course, in slabs."""
+    joint: float
+    """Width of the joints relative to a course."""
+    wear: float
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        hue, chroma = choose(rng, [(60.0, 0.012), (75.0, 0.03), (35.0, 0.06), (260.0, 0.008)])
+        base = uniform(rng, 0.5, 0.72)
+        rows = choose(rng, [4, 6, 8, 12, 16])
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            palette=tuple(
+                shade(base + step, chroma * uniform(rng, 0.5, 1.5), hue)
+                for step in (-0.07, -0.02, 0.02, 0.07)
+            ),
+            rows=rows,
+            columns=max(2, round(rows / choose(rng, [1.0, 1.5, 2.0]))),
+            bond=choose(rng, [0.5, 0.5, 0.0, 0.33]),
+            joint=uniform(rng, 0.03, 0.09),
+            wear=uniform(rng, 0.08, 0.2),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        x, y = unit_grid(self.size)
+        v = y * self.rows
+        row = np.floor(v).astype(np.int32) % self.rows
+        u = x * self.columns + np.float32(self.bond) * (row % 2)
+        column = np.floor(u).astype(np.int32) % self.columns
+        tone = rng.uniform(0.0, 1.0, (self.rows, self.columns)).astype(np.float32)[row, column]
+        across = np.minimum(u % 1, 1 - u % 1) * np.float32(self.rows / self.columns)
+        edge = np.minimum(across, np.minimum(v % 1, 1 - v % 1))
+        joint = np.float32(0.55) + np.float32(0.45) * smooth_step(edge, self.joint / 2, self.joint * 0.6)
+        stains = 1 + np.float32(self.wear) * spectral_noise(rng, self.size, 1.1, 1)
+        return finish(colorize(tone, self.palette) * (joint * np.clip(stains, 0.4, 1.5)), rng, 0.07)
+
+
+@dataclass(frozen=True)
+class Plaster(Texture):
+    """Rendered or painted wall, concrete, sandstone: one colour, clouds, streaks that rain has left."""
+
+    size: int
+    seed: int
+    color: Srgb
+    clouds: float
+    streaks: float
+    grain: float
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        hue = choose(
+            rng, [75.0, 85.0, 95.0, 50.0, 30.0, 150.0, 240.0], [0.25, 0.2, 0.15, 0.15, 0.1, 0.05, 0.1]
+        )
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            color=shade(uniform(rng, 0.55, 0.93), uniform(rng, 0.0, 0.075), hue + uniform(rng, -10.0, 10.0)),
+            clouds=uniform(rng, 0.03, 0.09),
+            streaks=uniform(rng, 0.0, 0.1),
+            grain=uniform(rng, 0.04, 0.1),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        clouds = np.float32(self.clouds) * spectral_noise(rng, self.size, 1.2, 1)
+        streaks = np.float32(self.streaks) * spectral_noise(rng, self.size, 0.9, 3, stretch=(1.0, 9.0))
+        return finish(paint(self.color) * np.clip(1 + clouds + streaks, 0.3, 1.6), rng, self.grain)
+
+
+@dataclass(frozen=True)
+class WindowPanes(Texture):
+    """What is behind a wall's openings: frames, dark glass, curtains, blinds, lit rooms.
+
+    A grid of cells, one a bay and floor of the wall; each opening shows the middle of its cell.
+    """
+
+    size: int
+    seed: int
+    opening: tuple[float, float]
+    """Width and height of the visible part, as shares of a cell."""
+    sill: float
+    """Height of its lower edge, as a share of the cell."""
+    frame: Srgb
+    glass: Srgb
+    lit: float
+    """Share of rooms with the light on."""
+    curtains: float
+    """Share of windows with curtains or blinds."""
+
+    popularity: ClassVar[float] = 0.0
+
+    CELLS: ClassVar[int] = 4
+    """Cells along one side."""
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        frame = (
+            shade(0.95, 0.01, 90.0)
+            if chance(rng, 0.6)
+            else shade(uniform(rng, 0.2, 0.6), 0.05, uniform(rng, 30.0, 260.0))
+        )
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            opening=(uniform(rng, 0.3, 0.7), uniform(rng, 0.4, 0.7)),
+            sill=uniform(rng, 0.2, 0.3),
+            frame=frame,
+            glass=shade(uniform(rng, 0.2, 0.38), 0.025, uniform(rng, 200.0, 260.0)),
+            lit=0.0,
+            curtains=uniform(rng, 0.1, 0.7),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        x, y = unit_grid(self.size)
+        cells = self.CELLS
+        u, v = x * cells, (1 - y) * cells
+        column, row = (grid.astype(np.int32) % cells for grid in (u, v))
+        # 0..1 within the opening, upwards.
+        a = (u % 1 - np.float32(0.5)) / np.float32(self.opening[0]) + np.float32(0.5)
+        b = (v % 1 - np.float32(self.sill)) / np.float32(self.opening[1])
+        room = rng.uniform(0.0, 1.0, (5, cells, cells)).astype(np.float32)[:, row, column]
+        depth = (
+            np.float32(0.6) + np.float32(0.6) * b + np.float32(0.25) * spectral_noise(rng, self.size, 1.3, 3)
+        )
+        picture = paint(self.glass) * depth
+        picture = mix(
+            picture,
+            np.array((255, 205, 130), np.float32)[:, None, None] * (1 - np.float32(0.35) * b),
+            (room[0] < self.lit).astype(np.float32) * np.float32(0.85),
+        )
+        picture = self._covered(picture, a, b, room)
+        edge = np.minimum(np.minimum(a, 1 - a), np.minimum(b, 1 - b))
+        frame = 1 - smooth_step(edge, 0.06, 0.02)
+        picture = mix(picture, paint(self.frame), frame)
+        if self.lit > 0:
+            # The whole picture glows by night: all but the lit rooms must be dark.
+            picture = picture * np.where(room[0] < self.lit, np.float32(1), np.float32(0.35))
+        return finish(picture, rng, 0.04)
+
+    def _covered(self, picture: Picture, a: Field, b: Field, room: Field) -> Picture:
+        """Curtains to the sides, or a blind let down part of the way."""
+        dressed = room[1] < self.curtains
+        tone = colorize(room[3], ((238, 234, 222), (225, 214, 190), (190, 190, 196), (150, 120, 100)))
+        folds = np.float32(0.85) + np.float32(0.15) * np.sin(a * np.float32(60))
+        drawn = np.float32(0.12) + np.float32(0.3) * room[4]
+        sides = (np.minimum(a, 1 - a) < drawn) & (room[2] < 0.6)
+        slats = np.float32(0.85) + np.float32(0.15) * np.sin(b * np.float32(70))
+        blind = (b > room[4]) & (room[2] >= 0.6)
+        picture = mix(picture, tone * folds, (dressed & sides).astype(np.float32) * np.float32(0.9))
+        return mix(picture, tone * slats, (dressed & blind).astype(np.float32) * np.float32(0.95))
+
+
+@dataclass(frozen=True)
+class RoofTiles(Texture):
+    """Courses of overlapping tiles or slates, each course shading the next."""
+
+    size: int
+    seed: int
+    palette: Palette
+    rows: int
+    columns: int
+    rounded: float
+    """How far the tiles' lower edges are rounded, 0..1."""
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        hue, chroma, base = choose(
+            rng, [(35.0, 0.1, 0.5), (40.0, 0.07, 0.42), (260.0, 0.015, 0.38), (60.0, 0.02, 0.5)]
+        )
+        base += uniform(rng, -0.05, 0.08)
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            palette=tuple(shade(base + step, chroma, hue + 60 * step) for step in (-0.08, 0.0, 0.07)),
+            rows=2 * integer(rng, 5, 8),
+            columns=2 * integer(rng, 5, 9),
+            rounded=uniform(rng, 0.0, 0.4),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        x, y = unit_grid(self.size)
+        across = np.abs((x * self.columns) % 1 - np.float32(0.5))
+        v = y * self.rows + np.float32(self.rounded) * (2 * across) ** 2
+        row = np.floor(v).astype(np.int32) % self.rows
+        u = x * self.columns + np.float32(0.5) * (row % 2)
+        column = np.floor(u).astype(np.int32) % self.columns
+        tone = rng.uniform(0.0, 1.0, (self.rows, self.columns)).astype(np.float32)[row, column]
+        shadow = np.float32(0.5) + np.float32(0.5) * smooth_step(v % 1, 0.1, 0.2)
+        gap = np.float32(0.7) + np.float32(0.3) * smooth_step(np.minimum(u % 1, 1 - u % 1), 0.05, 0.06)
+        moss = 1 + np.float32(0.12) * spectral_noise(rng, self.size, 1.2, 1)
+        return finish(colorize(tone, self.palette) * (shadow * gap * moss), rng, 0.07)
+
+
+@dataclass(frozen=True)
+class Foliage(Texture):
+    """Leaves in all directions, light ones over dark ones."""
+
+    size: int
+    seed: int
+    palette: Palette
+    """Dark to light."""
+    leaves: int
+    """Leaves along one side."""
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        hue = uniform(rng, 112.0, 142.0) if chance(rng, 0.82) else uniform(rng, 45.0, 100.0)
+        chroma, base = uniform(rng, 0.06, 0.13), uniform(rng, 0.3, 0.42)
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            palette=tuple(
+                shade(base + 0.16 * k, chroma * (0.7 + 0.15 * k), hue - 6 * k) for k in range(-1, 3)
+            ),
+            leaves=integer(rng, 14, 26),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        x, y = unit_grid(self.size)
+        nearest, first, second = nearest_seeds(rng, x, y, self.leaves, 1.0)
+        tone = rng.uniform(0.0, 1.0, self.leaves**2).astype(np.float32)[nearest]
+        clumps = np.float32(0.18) * spectral_noise(rng, self.size, 1.2, 2)
+        edge = smooth_step(second - first, 0.08, 0.2)
+        light = np.float32(0.55) + np.float32(0.5) * edge - np.float32(0.2) * first
+        return finish(
+            colorize(tone * np.float32(0.8) + clumps + np.float32(0.1), self.palette) * light, rng, 0.08
+        )
+
+
+@dataclass(frozen=True)
+class Grass(Texture):
+    """Mown lawn, meadow or bare earth between."""
+
+    size: int
+    seed: int
+    palette: Palette
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        hue = uniform(rng, 100.0, 135.0)
+        base, chroma = uniform(rng, 0.38, 0.52), uniform(rng, 0.05, 0.11)
+        dry = shade(base + 0.14, 0.05, 90.0)
+        green = [shade(base + step, chroma, hue) for step in (-0.12, 0.0, 0.08)]
+        return cls(size, new_seed(rng), (*green, dry))
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        blades = spectral_noise(rng, self.size, 0.5, 8, stretch=(1.0, 2.0))
+        tufts = spectral_noise(rng, self.size, 1.2, 1)
+        return finish(
+            colorize(to_unit(np.float32(0.6) * blades + np.float32(0.5) * tufts), self.palette), rng, 0.1
+        )
+
+
+@dataclass(frozen=True)
+class Bark(Texture):
+    """Ridges along the stem."""
+
+    size: int
+    seed: int
+    palette: Palette
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        base, hue = uniform(rng, 0.32, 0.55), uniform(rng, 50.0, 80.0)
+        return cls(size, new_seed(rng), tuple(shade(base + step, 0.03, hue) for step in (-0.16, 0.0, 0.12)))
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        ridges = spectral_noise(rng, self.size, 0.9, 5, stretch=(1.0, 4.0))
+        return finish(colorize(to_unit(ridges), self.palette), rng, 0.1)
+
+
+@dataclass(frozen=True)
+class WornPaint(Texture):
+    """Road paint that has been driven over."""
+
+    size: int
+    seed: int
+    color: Srgb
+    below: Srgb
+    """What shows where it has gone."""
+    worn: float
+    """Share gone, about."""
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        return cls(
+            size,
+            new_seed(rng),
+            shade(uniform(rng, 0.82, 0.94), 0.01, 90.0),
+            (92, 92, 92),
+            uniform(rng, 0.02, 0.3),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        noise = spectral_noise(rng, self.size, 0.7, 4)
+        gone = 1 - smooth_step(noise, float(np.quantile(noise, self.worn)), 0.7)
+        dirt = 1 + np.float32(0.06) * spectral_noise(rng, self.size, 1.1, 1)
+        return finish(mix(paint(self.color) * dirt, paint(self.below), gone), rng, 0.06)
+
+
+@dataclass(frozen=True)
+class RoadSign(Texture):
+    """The face of a sign: a border, a field and a device on it.
+
+    The picture is the square around the plate, once.
+    """
+
+    size: int
+    seed: int
+    corners: int
+    """Of the plate: 0 for a disc, 3, 4, 8."""
+    field: Srgb
+    border: Srgb
+    ink: Srgb
+    device: str
+    """bar, arrow, digits, ring or cross."""
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        white, red, blue, black = (240, 240, 236), (190, 22, 30), (22, 70, 160), (24, 24, 26)
+        yellow, green = (245, 190, 20), (20, 110, 60)
+        corners, field, border, ink = choose(
+            rng,
+            [
+                (0, white, red, black),
+                (0, blue, white, white),
+                (0, red, red, white),
+                (3, white, red, black),
+                (4, blue, white, white),
+                (4, yellow, black, black),
+                (4, green, white, white),
+                (8, red, white, white),
+            ],
+        )
+        return cls(
+            size,
+            new_seed(rng),
+            corners,
+            field,
+            border,
+            ink,
+            choose(rng, ["bar", "arrow", "digits", "ring", "cross"]),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        x, y = unit_grid(self.size)
+        u, v = 2 * x - 1, 1 - 2 * y
+        picture = np.broadcast_to(paint(self.field), (3, *u.shape))
+        rim = smooth_step(self._gauge(u, v), 0.84, 0.03)
+        picture = mix(picture, paint(self.ink), self._device(rng, u, v).astype(np.float32))
+        picture = mix(picture, paint(self.border), rim)
+        return finish(picture * (1 + np.float32(0.04) * spectral_noise(rng, self.size, 1.2, 1)), rng, 0.03)
+
+    def _gauge(self, u: Field, v: Field) -> Field:
+        """1 on the plate's edge, 0 in its middle."""
+        if self.corners == 0:
+            return np.hypot(u, v)
+        if self.corners == 4:
+            return np.maximum(np.abs(u), np.abs(v))
+        if self.corners == 3:
+            # The triangle's middle lies below that of its bounding square.
+            v = v + np.float32(0.2)
+            return np.maximum(-v * 2, v + np.float32(1.55) * np.abs(u)) * np.float32(0.8)
+        diagonal = (np.abs(u) + np.abs(v)) / np.float32(np.sqrt(2.0))
+        return np.maximum(np.maximum(np.abs(u), np.abs(v)), diagonal)
+
+    def _device(self, rng: np.random.Generator, u: Field, v: Field) -> NDArray[np.bool_]:
+        if self.corners == 3:
+            v = v + np.float32(0.25)
+            u, v = u * np.float32(1.7), v * np.float32(1.7)
+        if self.device == "bar":
+            return (np.abs(u) < 0.6) & (np.abs(v) < 0.14)
+        if self.device == "arrow":
+            head = (v > 0.05) & (v < 0.55) & (np.abs(u) < (np.float32(0.55) - v) * np.float32(0.9))
+            return head | ((np.abs(u) < 0.11) & (v > -0.55) & (v <= 0.1))
+        if self.device == "ring":
+            return np.abs(np.hypot(u, v) - np.float32(0.38)) < 0.11
+        if self.device == "cross":
+            return (np.abs(np.abs(u) - np.abs(v)) < 0.14) & (np.hypot(u, v) < 0.65)
+        # Two or three numerals of seven segments each.
+        count = int(rng.integers(2, 4))
+        place = (u + np.float32(0.6)) * np.float32(count / 1.2)
+        a, b = place % 1 - np.float32(0.5), v / np.float32(0.42)
+        on = rng.random((count, 7)) < 0.7
+        digit = on[np.clip(place.astype(np.int32), 0, count - 1)]
+        bars = [np.abs(b - level) < 0.14 for level in (-1.0, 0.0, 1.0)]
+        sides = [np.abs(a - side) < 0.1 for side in (-0.28, 0.28)]
+        wide, inside = np.abs(a) < 0.34, (np.abs(u) < 0.6) & (np.abs(b) < 1.14)
+        lit = np.zeros(u.shape, bool)
+        for k, bar in enumerate(bars):
+            lit |= bar & wide & digit[..., k]
+        for k, side in enumerate(sides):
+            lit |= side & (b > 0) & digit[..., 3 + 2 * k]
+            lit |= side & (b < 0) & digit[..., 4 + 2 * k]
+        return lit & inside
+
+
+@dataclass(frozen=True)
+class WheelFace(Texture):
+    """A wheel from the side: black tyre, spoked or slotted rim, hub."""
+
+    size: int
+    seed: int
+    rim: float
+    """Radius of the rim as a share of half the picture."""
+    spokes: int
+    metal: Srgb
+    fill: float
+    """Share of the rim that is metal, 0..1."""
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        return cls(
+            size=size,
+            seed=new_seed(rng),
+            rim=0.4,
+            spokes=choose(rng, [5, 5, 6, 7, 8, 10, 12]),
+            metal=shade(uniform(rng, 0.4, 0.85), 0.01, 250.0),
+            fill=uniform(rng, 0.35, 0.75),
+        )
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        x, y = unit_grid(self.size)
+        # Coordinates start in the wheel's middle: the picture is wrapped around it.
+        u, v = (x + np.float32(0.5)) % 1 * 2 - 1, (y + np.float32(0.5)) % 1 * 2 - 1
+        radius = np.hypot(u, v) / np.float32(self.rim)
+        angle = np.arctan2(v, u) * np.float32(self.spokes / (2 * np.pi))
+        spoke = np.abs(angle % 1 - np.float32(0.5)) < np.float32(self.fill / 2)
+        metal = ((radius < 0.95) & (spoke | (radius < 0.3) | (radius > 0.82))).astype(np.float32)
+        tyre = np.float32(34) * (1 - np.float32(0.3) * ((radius > 1.2) & (radius < 1.3)))
+        picture = mix(np.broadcast_to(tyre, (3, *u.shape)), paint(self.metal), metal)
+        return finish(picture, rng, 0.05)
