@@ -17,6 +17,7 @@ class Mesh:
     triangles: NDArray[np.int32]
     """(F, 3) indices into `vertices`, counter-clockwise seen from outside."""
     corner_uv: NDArray[np.float32]
-    """(F, 3, 2) texture coordinates of each triangle's corners, in local units."""
+    """(F, 3, 2) texture coordinates of each triangle's corners, in local units (in metres for shapes made to
+    measure)."""
     smooth: bool = False
     """Whether shading normals are interpolated over the surface (geometry is unaffected)."""

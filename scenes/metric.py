@@ -65,6 +65,12 @@ class MetricShape(Shape):
         """Half the longest side of the bounding box: the scale at which the shape has its own size."""
         return self._built[2]
 
+    @cached_property
+    def half_box_m(self) -> NDArray[np.float64]:
+        """(3,) half the sides of the bounding box."""
+        half: NDArray[np.float64] = np.abs(self.mesh().vertices).max(axis=0) * self.half_extent_m
+        return half
+
     @property
     def middle_m(self) -> NDArray[np.float64]:
         """(3,) the middle of the bounding box, seen from the shape's origin."""

@@ -227,10 +227,10 @@ class HouseWalls(MetricShape):
         high = design.eaves + float(np.tan(np.radians(design.roof_pitch_deg))) * (design.depth / 2 - 0.1)
         profile = [(0.1, design.eaves - 0.1), (design.depth - 0.1, design.eaves - 0.1)]
         profile += [(design.depth / 2 + 0.02, high - 0.06), (design.depth / 2 - 0.02, high - 0.06)]
-        ends = []
-        for x in (0.03, design.width - 0.03 - WALL_M):
-            ends.append([(x + out, y, z) for out in (0.0, WALL_M) for y, z in profile])
-        return hexahedra(np.array(ends))
+        ends = (0.03, design.width - 0.03 - WALL_M)
+        return hexahedra(
+            np.array([[(x + out, y, z) for out in (0.0, WALL_M) for y, z in profile] for x in ends])
+        )
 
 
 @dataclass(frozen=True)
@@ -345,8 +345,9 @@ class HouseTrim(MetricShape):
                 left, right = bay * design.bay + 0.25, (bay + 1) * design.bay - 0.25
                 items.append(((left, -0.95, base - 0.14), (right, 0.2, base)))
                 items.append(((left, -0.95, base + 0.9), (right, -0.89, base + 0.97)))
-                for x in (left, right - 0.05):
-                    items.append(((x, -0.9, base + 0.91), (x + 0.05, 0.1, base + 0.96)))
+                items += [
+                    ((x, -0.9, base + 0.91), (x + 0.05, 0.1, base + 0.96)) for x in (left, right - 0.05)
+                ]
                 posts = np.linspace(left + 0.02, right - 0.05, 1 + int((right - left) / 0.16))
                 items += [((x, -0.93, base - 0.05), (x + 0.025, -0.905, base + 0.92)) for x in posts.tolist()]
         return items

@@ -45,7 +45,7 @@ class PersonDesign:
         return cls(
             height=uniform(rng, 1.05, 1.45) if child else uniform(rng, 1.55, 1.92),
             girth=uniform(rng, 0.92, 1.3),
-            stride_deg=uniform(rng, 4.0, 32.0),
+            stride_deg=uniform(rng, 3.0, 24.0),
             lead=1.0 if chance(rng, 0.5) else -1.0,
             arms_deg=uniform(rng, 4.0, 14.0),
             skirt=uniform(rng, 0.25, 0.6) if chance(rng, 0.35) else 0.0,
@@ -96,7 +96,7 @@ def _limb(joints: NDArray[np.float64], radii: tuple[float, float, float]) -> _Pa
     path = np.stack([ends[0], joints[0], middle[0], joints[1], middle[1], joints[2], ends[1]])
     a, b, c = radii
     radius = np.array([0.55 * a, a, (a + b) / 2, b, (b + c) / 2, c, 0.6 * c])
-    vertices, triangles, _ = tube(path, radius, 10)
+    vertices, triangles, _ = tube(path, radius, 8)
     return vertices, triangles
 
 
@@ -108,17 +108,17 @@ def _directions(joints: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _stack(levels: list[tuple[float, float, float, float]], girth: float) -> _Part:
     """An upright body of elliptic sections: height, half width, half depth, and middle x of each."""
-    angle = np.linspace(0, 2 * np.pi, 18, endpoint=False)
+    angle = np.linspace(0, 2 * np.pi, 14, endpoint=False)
     rings = [
-        np.stack([x + deep * girth * np.cos(angle), wide * girth * np.sin(angle), np.full(18, z)], -1)
+        np.stack([x + deep * girth * np.cos(angle), wide * girth * np.sin(angle), np.full(14, z)], -1)
         for z, wide, deep, x in levels
     ]
     return loft(np.stack(rings))
 
 
 def _ball(middle: tuple[float, float, float], size: tuple[float, float, float]) -> _Part:
-    latitude = np.linspace(-np.pi / 2, np.pi / 2, 11)
-    vertices, triangles = revolve(np.cos(latitude), np.sin(latitude), 16)
+    latitude = np.linspace(-np.pi / 2, np.pi / 2, 8)
+    vertices, triangles = revolve(np.cos(latitude), np.sin(latitude), 11)
     return vertices * size + middle, triangles
 
 

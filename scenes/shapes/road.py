@@ -66,11 +66,17 @@ class Course:
     def point(
         self, s_m: NDArray[np.float64] | float, t_m: NDArray[np.float64] | float
     ) -> NDArray[np.float64]:
-        """(..., 2) world x, y of a place on the street."""
+        """(..., 2) world x, y of a place on the street, or on its straight continuation beyond its ends."""
         s, x, y, _ = self._table.T
         heading = self.heading(s_m)
+        beyond = s_m - np.clip(s_m, s[0], s[-1])
+        along, aside = np.cos(heading), np.sin(heading)
         return np.stack(
-            [np.interp(s_m, s, x) - t_m * np.sin(heading), np.interp(s_m, s, y) + t_m * np.cos(heading)], -1
+            [
+                np.interp(s_m, s, x) + beyond * along - t_m * aside,
+                np.interp(s_m, s, y) + beyond * aside + t_m * along,
+            ],
+            -1,
         )
 
     def place(self, s_m: float, t_m: float, z_m: float = 0.0) -> Vector:
@@ -91,7 +97,8 @@ class Course:
         return np.stack([s[nearest] + dx * cosine + dy * sine, dy * cosine - dx * sine], -1)
 
 
-def _sample_course(rng: np.random.Generator) -> Course:
+def sample_course(rng: np.random.Generator) -> Course:
+    """Any course, for shapes that are drawn on their own."""
     return Course.sample(rng, -20.0, uniform(rng, 60.0, 180.0), 25.0)
 
 
@@ -117,7 +124,7 @@ class RoadStrip(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        course = _sample_course(rng)
+        course = sample_course(rng)
         half = uniform(rng, 1.0, 6.0)
         return cls(course, course.start_m, course.end_m, half, -half, 0.0, uniform(rng, 0.1, 0.4), 0.05)
 
@@ -163,7 +170,7 @@ class RoadPaint(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        course = _sample_course(rng)
+        course = sample_course(rng)
         dash, gap = uniform(rng, 1.0, 4.0), uniform(rng, 1.0, 6.0)
         width = uniform(rng, 0.08, 0.25)
         starts = np.arange(course.start_m, course.end_m - dash, dash + gap)
@@ -228,7 +235,7 @@ class Kerb(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        course = _sample_course(rng)
+        course = sample_course(rng)
         return cls(
             course,
             course.start_m,

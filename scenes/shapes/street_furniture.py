@@ -96,8 +96,8 @@ class LampLight(MetricShape):
     def surface(self) -> Surface:
         parts = []
         for x, z in self.design.heads:
-            latitude = np.linspace(-np.pi / 2, np.pi / 2, 9)
-            ball, triangles = revolve(np.cos(latitude), np.sin(latitude), 14)
+            latitude = np.linspace(-np.pi / 2, np.pi / 2, 7)
+            ball, triangles = revolve(np.cos(latitude), np.sin(latitude), 10)
             if self.design.kind == "globe":
                 parts.append((ball * 0.19 + (x, 0.0, z), triangles))
             else:
@@ -215,76 +215,6 @@ class TrafficLightLens(MetricShape):
             ]
             parts.append(loft(np.stack(rings)))
         return Surface(*joined(*parts))
-
-
-@dataclass(frozen=True)
-class Fence(MetricShape):
-    """A panel of fence along x from its origin: railings, pickets, boards, wire mesh, a low wall."""
-
-    kind: str
-    length: float
-    height: float
-    step: float
-    """Distance between bars or pickets."""
-
-    @classmethod
-    def sample(cls, rng: np.random.Generator) -> Self:
-        kind = choose(rng, ["railing", "picket", "boards", "mesh", "wall"])
-        height = {
-            "railing": (0.9, 1.4),
-            "picket": (0.8, 1.1),
-            "boards": (1.5, 1.9),
-            "mesh": (1.3, 2.2),
-            "wall": (0.5, 1.2),
-        }[kind]
-        step = {
-            "railing": (0.11, 0.16),
-            "picket": (0.12, 0.17),
-            "boards": (0.14, 0.2),
-            "mesh": (0.16, 0.24),
-            "wall": (0.3, 0.3),
-        }[kind]
-        return cls(kind, uniform(rng, 2.2, 3.4), uniform(rng, *height), uniform(rng, *step))
-
-    def surface(self) -> Surface:
-        length, high = self.length, self.height
-        if self.kind == "wall":
-            low = np.array([(0.0, -0.12, -0.2), (-0.005, -0.16, high)])
-            return Surface(
-                *boxes(low, np.array([(length, 0.12, high + 0.01), (length - 0.005, 0.16, high + 0.09)]))
-            )
-        if self.kind == "mesh":
-            return self._mesh()
-        count = max(3, int(length / self.step))
-        x = np.arange(count) * (length / count)
-        wide = {"railing": 0.02, "picket": 0.075, "boards": 0.9 * length / count}[self.kind]
-        deep = 0.02
-        bars_low = np.stack([x, np.full(count, -deep / 2), np.full(count, 0.06)], -1)
-        bars_high = np.stack([x + wide, np.full(count, deep / 2), np.full(count, high)], -1)
-        rails = [(0.0, 0.009, 0.2), (0.0, 0.009, high - 0.22)]
-        rail_low = np.array(rails)
-        rail_high = rail_low + np.array((length, 0.035, 0.06 if self.kind != "railing" else 0.03))
-        post_low = np.array([(-0.04, -0.045, -0.2)])
-        post_high = np.array([(0.045, 0.045, high + 0.06)])
-        return Surface(
-            *boxes(
-                np.concatenate([bars_low, rail_low, post_low]),
-                np.concatenate([bars_high, rail_high, post_high]),
-            )
-        )
-
-    def _mesh(self) -> Surface:
-        """Thin wires both ways between posts."""
-        upright = np.arange(self.step, self.length, self.step)
-        level = np.arange(0.1, self.height, self.step)
-        start = [*[(x, 0.0, 0.05) for x in upright], *[(0.0, 0.004, z) for z in level], (0.0, 0.0, -0.2)]
-        end = [
-            *[(x, 0.0, self.height) for x in upright],
-            *[(self.length, 0.004, z) for z in level],
-            (0.0, 0.0, self.height + 0.06),
-        ]
-        radius = np.array([*[0.006] * (len(start) - 1), 0.03])
-        return Surface(*struts(np.array(start), np.array(end), radius, radius, 5))
 
 
 @dataclass(frozen=True)

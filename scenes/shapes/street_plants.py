@@ -1,4 +1,4 @@
-"""Trees and hedges along a street: stems, and crowns of clumps with leaves standing out of them."""
+"""Trees and bushes along a street: stems, and crowns of clumps with leaves standing out of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from scenes.drawing import chance, choose, integer, new_seed, uniform
 from scenes.geometry import Triangles, Vertices, icosphere, joined, struts
-from scenes.metric import MetricShape, Surface, boxes
+from scenes.metric import MetricShape, Surface
 from scenes.shapes.organic import wave_noise
 
 _Part = tuple[Vertices, Triangles]
@@ -103,7 +103,7 @@ class TreeStem(MetricShape):
         """Two generations of ever thinner twigs along the boughs."""
         parts = []
         start, end, radius, length = fork, tips, 0.2 * self.design.stem_radius, 0.3 * self.design.crown_width
-        for children in (7, 5):
+        for children in (5, 4):
             share = rng.uniform(0.3, 1.0, (len(start), children, 1))
             foot = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3)
             along = np.repeat(end - start, children, axis=0)
@@ -116,7 +116,7 @@ class TreeStem(MetricShape):
         return parts
 
 
-def _leaves(rng: np.random.Generator, places: Vertices, outward: Vertices, size: float) -> _Part:
+def sprays(rng: np.random.Generator, places: Vertices, outward: Vertices, size: float) -> _Part:
     """Flat pointed sprays at places (N, 3), leaning outward and in all directions."""
     count = len(places)
     aim = outward + rng.normal(0, 0.7, (count, 3))
@@ -131,7 +131,7 @@ def _leaves(rng: np.random.Generator, places: Vertices, outward: Vertices, size:
 
 def _clump(rng: np.random.Generator, middle: NDArray[np.float64], radius: float) -> _Part:
     """A lumpy ball."""
-    ball, triangles = icosphere(2)
+    ball, triangles = icosphere(1)
     lumps = 1 + 0.16 * wave_noise(rng, ball, 2.5, 1.0)
     return middle + ball * (radius * lumps[:, None] * (1.0, 1.0, 0.85)), triangles
 
@@ -146,7 +146,7 @@ class TreeCrown(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(TreeDesign.sample(rng), integer(rng, 60, 130))
+        return cls(TreeDesign.sample(rng), integer(rng, 15, 130))
 
     def surface(self) -> Surface:
         rng = np.random.default_rng(self.design.seed + 1)
@@ -157,44 +157,8 @@ class TreeCrown(MetricShape):
             around = rng.normal(0, 1.0, (self.sprays, 3))
             around /= np.linalg.norm(around, axis=1, keepdims=True)
             reach = float(radius) * rng.uniform(0.75, 1.0, (self.sprays, 1))
-            parts.append(_leaves(rng, middle + around * reach * (1.0, 1.0, 0.85), around, self.design.leaf))
+            parts.append(sprays(rng, middle + around * reach * (1.0, 1.0, 0.85), around, self.design.leaf))
         return Surface(*joined(*parts))
-
-
-@dataclass(frozen=True)
-class Hedge(MetricShape):
-    """A clipped or shaggy hedge along the x axis, in its middle."""
-
-    length: float
-    height: float
-    width: float
-    leaf: float
-    seed: int
-
-    @classmethod
-    def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(
-            length=uniform(rng, 3.0, 8.0),
-            height=uniform(rng, 0.7, 1.9),
-            width=uniform(rng, 0.5, 1.0),
-            leaf=uniform(rng, 0.08, 0.2),
-            seed=new_seed(rng),
-        )
-
-    def surface(self) -> Surface:
-        rng = np.random.default_rng(self.seed)
-        half, wide, high = self.length / 2, self.width / 2, self.height
-        body = boxes(np.array((-half, -0.85 * wide, -0.1)), np.array((half, 0.85 * wide, 0.94 * high)))
-        count = int(70 * self.length * (self.height + 0.5 * self.width))
-        count = min(count, 1500)
-        face = rng.random(count) * (2 * high + self.width)
-        x = rng.uniform(-half, half, count)
-        on_top = face > 2 * high
-        side = np.where(face > high, 1.0, -1.0)
-        y = np.where(on_top, rng.uniform(-wide, wide, count), side * 0.84 * wide)
-        z = np.where(on_top, 0.93 * high, face % high)
-        normal = np.stack([np.zeros(count), np.where(on_top, 0.0, side), on_top.astype(float)], -1)
-        return Surface(*joined(body, _leaves(rng, np.stack([x, y, z], -1), normal, self.leaf)))
 
 
 @dataclass(frozen=True)
@@ -219,7 +183,7 @@ class Shrub(MetricShape):
             around = rng.normal(0, 1.0, (90, 3))
             around[:, 2] = np.abs(around[:, 2])
             around /= np.linalg.norm(around, axis=1, keepdims=True)
-            parts.append(_leaves(rng, middle + around * radius * 0.9, around, self.leaf))
+            parts.append(sprays(rng, middle + around * radius * 0.9, around, self.leaf))
         turn = Rotation.from_euler("Z", rng.uniform(0, 2 * np.pi))
         vertices, triangles = joined(*parts)
         return Surface(turn.apply(vertices) if chance(rng, 0.5) else vertices, triangles)

@@ -13,7 +13,7 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
-from scenes.drawing import choose, uniform
+from scenes.drawing import choose, integer, uniform
 from scenes.geometry import Triangles, Vertices, joined, manifold_arrays, revolve
 from scenes.metric import MetricShape, Surface, boxes, hexahedra, loft, outward
 from scenes.spec import Vector
@@ -325,8 +325,8 @@ class CarLamps(MetricShape):
 
 def _lens(middle: NDArray[np.float64], size: NDArray[np.float64]) -> _Part:
     """A rounded lamp: an ellipsoid of the given half extents."""
-    latitude = np.linspace(-np.pi / 2, np.pi / 2, 9)
-    vertices, triangles = revolve(np.cos(latitude), np.sin(latitude), 14)
+    latitude = np.linspace(-np.pi / 2, np.pi / 2, 7)
+    vertices, triangles = revolve(np.cos(latitude), np.sin(latitude), 10)
     return vertices * size + middle, triangles
 
 
@@ -595,12 +595,15 @@ class Wheel(MetricShape):
     width: float
     rim: float
     """Radius of the rim relative to the wheel."""
+    sides: int = 24
 
     smooth: ClassVar[bool] = True
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(uniform(rng, 0.28, 0.5), uniform(rng, 0.18, 0.26), uniform(rng, 0.6, 0.72))
+        return cls(
+            uniform(rng, 0.28, 0.5), uniform(rng, 0.18, 0.26), uniform(rng, 0.6, 0.72), integer(rng, 12, 28)
+        )
 
     def surface(self) -> Surface:
         r, w, rim = self.radius, self.width / 2, self.rim * self.radius
@@ -616,7 +619,7 @@ class Wheel(MetricShape):
             (r, 0.8 * w),
         ]
         profile = np.array([*half, (r, 0.0), *[(a, -b) for a, b in half[::-1]]])
-        vertices, triangles = revolve(profile[:, 0], profile[:, 1], 28)
+        vertices, triangles = revolve(profile[:, 0], profile[:, 1], self.sides)
         tread = np.clip(0.8 * w - np.abs(vertices[:, 2]), 0.0, None)
         tread[np.hypot(vertices[:, 0], vertices[:, 1]) < 0.9 * r] = 0.0
         plan = vertices[:, :2] * (1 + tread / r)[:, None]
@@ -624,3 +627,26 @@ class Wheel(MetricShape):
         axle_y = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], -1)
         triangles = outward(axle_y, triangles)
         return Surface(axle_y, triangles, plan[triangles])
+
+
+@dataclass(frozen=True)
+class WheelSet(MetricShape):
+    """All wheels of a vehicle that stands still, in its own frame."""
+
+    wheel: Wheel
+    places: tuple[tuple[float, float], ...]
+    """x and y of each."""
+
+    smooth: ClassVar[bool] = True
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator) -> Self:
+        x, y = uniform(rng, 1.1, 1.5), uniform(rng, 0.7, 0.9)
+        return cls(Wheel.sample(rng), ((x, y), (x, -y), (-x, y), (-x, -y)))
+
+    def surface(self) -> Surface:
+        one = self.wheel.surface()
+        hubs = [np.array((x, y, self.wheel.radius)) for x, y in self.places]
+        vertices, triangles = joined(*((one.vertices + hub, one.triangles) for hub in hubs))
+        assert one.uv is not None
+        return Surface(vertices, triangles, np.tile(one.uv, (len(hubs), 1, 1)))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.metric import MetricShape
 from scenes.motion import exposure_times
 from scenes.spec import SceneObject, StereoCamera
 from scenes.streets.assembly import Thing
@@ -17,14 +18,18 @@ _LATTICE = _LATTICE[np.abs(_LATTICE).max(axis=1) > 0.999]
 """Points all over the faces of the cube [-1, 1]^3."""
 
 
+_OUT_OF_SIGHT_M = 12.0
+"""What stays this far outside both eyes' view at all times is left out: its shadow would hardly be seen."""
+
+
 def keep_clear(things: Sequence[Thing], camera: StereoCamera, config: DrivingConfig) -> list[Thing]:
-    """The things that keep their distance from both eyes at all times.
+    """The things that may be seen and keep their distance from both eyes at all times.
 
     A thing is judged by the bounding boxes of its objects: none may come nearer than `clearance_m`, and no
     part of one that is in view may have a disparity above `largest_disparity_share`.
     """
     watch = _Watch(camera, config)
-    return [thing for thing in things if not any(watch.too_near(item) for item in thing)]
+    return [thing for thing in things if watch.may_be_seen(thing) and not any(map(watch.too_near, thing))]
 
 
 class _Watch:
@@ -41,15 +46,28 @@ class _Watch:
         self.half_y = 1.06 * config.height / 2 / camera.focal_px
         self.far_m = max(self.nearest_m, self.clearance_m)
 
+    def may_be_seen(self, thing: Thing) -> bool:
+        return any(self._in_sight(item) for item in thing)
+
+    def _in_sight(self, item: SceneObject) -> bool:
+        key_places, half, slack = _reach(item)
+        reach = float(np.linalg.norm(half)) + slack + _OUT_OF_SIGHT_M
+        seen = np.einsum("tij,kj->tki", self.to_eye[:, :3, :3], key_places) + self.to_eye[:, None, :3, 3]
+        outside = np.abs(seen[..., 0] - self.right[0] / 2) + self.half_x * seen[..., 2]
+        # The distance from the nearer side of the view, and from the plane of the eyes.
+        side = outside / np.hypot(1.0, self.half_x)
+        return bool(((side < reach) & (seen[..., 2] < reach)).any())
+
     def too_near(self, item: SceneObject) -> bool:
-        half = _half_box(item)
-        reach_m = float(np.linalg.norm(half))
-        if len(item.motion.times_frames) == 1:
-            to_eyes = self.to_eye @ item.motion.pose(0.0)
-        else:
-            to_eyes = self.to_eye @ np.stack([item.motion.pose(time) for time in self.times])
-        distance = np.linalg.norm(to_eyes[:, :3, 3], axis=1)
-        near = distance < reach_m + self.far_m + self.right[0]
+        key_places, half, slack = _reach(item)
+        limit = float(np.linalg.norm(half)) + self.far_m + self.right[0]
+        rough = np.einsum("tij,kj->tki", self.to_eye[:, :3, :3], key_places) + self.to_eye[:, None, :3, 3]
+        if np.linalg.norm(rough, axis=2).min() > limit + slack:
+            return False
+        still = len(item.motion.times_frames) == 1
+        poses = item.motion.pose(0.0) if still else np.stack([item.motion.pose(time) for time in self.times])
+        to_eyes = self.to_eye @ poses
+        near = np.linalg.norm(to_eyes[:, :3, 3], axis=1) < limit
         return any(self._near_box(pose, half) for pose in to_eyes[near])
 
     def _near_box(self, pose: NDArray[np.float64], half: NDArray[np.float64]) -> bool:
@@ -67,7 +85,9 @@ class _Watch:
         return bool((front & seen).any())
 
 
-def _half_box(item: SceneObject) -> NDArray[np.float64]:
-    vertices = item.shape.mesh().vertices
-    half: NDArray[np.float64] = np.abs(vertices).max(axis=0) * item.scale_m
-    return half
+def _reach(item: SceneObject) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Key positions (K, 3), half the bounding box (3,), and how far from a key position it may get."""
+    assert isinstance(item.shape, MetricShape)
+    places = np.array(item.motion.positions_m)
+    slack = float(np.linalg.norm(np.diff(places, axis=0), axis=1).max(initial=0.0))
+    return places, item.shape.half_box_m, slack

@@ -12,6 +12,7 @@ from scenes.shapes.buildings import NOMINAL_BAY_M, HouseDesign
 from scenes.spec import Material, Texture
 from scenes.textures.layers import Layered
 from scenes.textures.marks import BlurredShapes, DeadLeaves, Facade, GlyphRows
+from scenes.textures.noise import WoodPlanks
 from scenes.textures.plain import NearTextureless, SolidColor
 from scenes.textures.streets import (
     Asphalt,
@@ -28,8 +29,6 @@ from scenes.textures.streets import (
     shade,
 )
 from scenes.textures.tiles import Bricks, Plaid, Stripes
-from scenes.textures.noise import WoodPlanks
-
 
 WINDOW_FRAMES: tuple[Srgb, ...] = (
     (238, 236, 230),
@@ -54,6 +53,10 @@ def plain(color: Srgb, *, roughness: float = 1.0, specular: float = 0.0, metalli
 
 def asphalt(rng: np.random.Generator) -> Material:
     return tiled(Asphalt.sample(rng, 512), uniform(rng, 4.0, 5.5))
+
+
+def tarmac_patch(rng: np.random.Generator) -> Material:
+    return tiled(Asphalt.sample(rng, 256), 2.3)
 
 
 def pavement(rng: np.random.Generator) -> Material:
@@ -129,8 +132,8 @@ def windows(rng: np.random.Generator, design: HouseDesign, frame: Srgb, lit: flo
 
 def shop_window(rng: np.random.Generator, lit: float) -> Material:
     """Goods behind glass."""
-    kind = choose(rng, [DeadLeaves, BlurredShapes, Layered])
-    goods = tiled(kind.sample(rng, 128), uniform(rng, 2.0, 4.0))
+    kinds: list[type[Texture]] = [DeadLeaves, BlurredShapes, Layered]
+    goods = tiled(choose(rng, kinds).sample(rng, 128), uniform(rng, 2.0, 4.0))
     if lit:
         return replace(goods, emission=uniform(rng, 0.3, 0.8), specular=0.3, roughness=0.3)
     return replace(goods, specular=0.6, roughness=0.05)
@@ -216,6 +219,13 @@ def bark(rng: np.random.Generator) -> Material:
 def metal_paint(rng: np.random.Generator) -> Material:
     color = shade(uniform(rng, 0.2, 0.75), uniform(rng, 0.0, 0.05), choose(rng, [150.0, 250.0, 90.0]))
     return tiled(NearTextureless(64, new_seed(rng), color, 0.06, 0.04), 0.8)
+
+
+def fence(rng: np.random.Generator, kind: str) -> Material:
+    """For a kind of `Fence`."""
+    if kind == "wall":
+        return wall(rng, 0.3)
+    return wood(rng) if kind in ("boards", "picket") and chance(rng, 0.6) else metal_paint(rng)
 
 
 def wood(rng: np.random.Generator) -> Material:

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from scenes.drawing import Range, chance, choose, integer, uniform
+from scenes.metric import MetricShape, standing
+from scenes.shapes.boundaries import Fence, Hedge
 from scenes.shapes.buildings import (
     CityBlock,
     HouseDesign,
@@ -16,11 +19,8 @@ from scenes.shapes.buildings import (
     HouseWindows,
     ShopFront,
 )
-from scenes.metric import standing
-from scenes.motion import vector
 from scenes.shapes.road import Course
-from scenes.shapes.street_furniture import Fence
-from scenes.shapes.street_plants import Hedge, Shrub
+from scenes.shapes.street_plants import Shrub
 from scenes.streets import finishes
 from scenes.streets.assembly import Assembly, by_the_street
 
@@ -89,15 +89,11 @@ class Side:
 
 @dataclass(frozen=True)
 class _Style:
-    """A house design with the materials it is built of."""
+    """A house design, built once, with the materials of all parts but the walls."""
 
     design: HouseDesign
-    trim: int
-    upper: int
-    ground: int
-    roof: int
-    shop: ShopFront | None
-    board: int
+    walls: HouseWalls
+    parts: tuple[tuple[str, MetricShape, int], ...]
 
 
 def add_houses(
@@ -143,21 +139,19 @@ def _room_for(course: Course, side: Side, s_m: float, design: HouseDesign) -> tu
 
 def _sample_style(rng: np.random.Generator, scene: Assembly, district: District, lit: float) -> _Style:
     design = HouseDesign.sample(rng, choose(rng, district.houses))
-    frame = finishes.WINDOW_FRAMES[integer(rng, 0, len(finishes.WINDOW_FRAMES) - 1)]
-    upper = scene.material(finishes.windows(rng, design, frame, lit))
-    shop = None
+    upper = scene.material(finishes.windows(rng, design, choose(rng, finishes.WINDOW_FRAMES), lit))
+    ground = scene.material(finishes.shop_window(rng, lit)) if design.shop else upper
+    parts: list[tuple[str, MetricShape, int]] = [
+        ("trim", HouseTrim(design), scene.material(finishes.trim(rng))),
+        ("ground floor windows", HouseWindows(design, ground=True), ground),
+        ("roof", HouseRoof(design), scene.material(finishes.roof(rng))),
+    ]
+    if design.floors > 1:
+        parts.append(("windows", HouseWindows(design, ground=False), upper))
     if design.shop:
-        front = ShopFront.sample(rng)
-        shop = replace(front, width=design.width, height=design.ground_floor - 0.72)
-    return _Style(
-        design=design,
-        trim=scene.material(finishes.trim(rng)),
-        upper=upper,
-        ground=scene.material(finishes.shop_window(rng, lit)) if design.shop else upper,
-        roof=scene.material(finishes.roof(rng)),
-        shop=shop,
-        board=scene.material(finishes.shop_board(rng)) if shop else upper,
-    )
+        front = replace(ShopFront.sample(rng), width=design.width, height=design.ground_floor - 0.72)
+        parts.append(("shop front", front, scene.material(finishes.shop_board(rng))))
+    return _Style(design, HouseWalls(design), tuple(parts))
 
 
 def _add_house(
@@ -171,16 +165,7 @@ def _add_house(
     back_m: float,
 ) -> None:
     design = style.design
-    parts = [
-        ("walls", HouseWalls(design), wall),
-        ("trim", HouseTrim(design), style.trim),
-        ("ground floor windows", HouseWindows(design, ground=True), style.ground),
-        ("roof", HouseRoof(design), style.roof),
-    ]
-    if design.floors > 1:
-        parts.append(("windows", HouseWindows(design, ground=False), style.upper))
-    if style.shop:
-        parts.append(("shop front", style.shop, style.board))
+    parts = [("walls", style.walls, wall), *style.parts]
     t = side.sign * (side.front_m + back_m)
     # The design's origin is the front's end; the place asked for is its middle.
     middle = course.point(s_m, t)
@@ -197,40 +182,17 @@ def add_boundary(
     if side.front_m - side.edge_m < 1.5 or not side.district.boundary:
         return
     kind = choose(rng, side.district.boundary)
-    panel: Fence | Hedge
+    shape: MetricShape
     if kind == "hedge":
-        panel, material = Hedge.sample(rng), scene.material(finishes.foliage(rng))
+        t = side.sign * (side.edge_m + 0.5)
+        shape = replace(Hedge.sample(rng, course), from_m=start_m, to_m=end_m, t_m=t)
+        material = finishes.foliage(rng)
     else:
-        panel = Fence.sample(rng)
-        while panel.kind != kind:
-            panel = Fence.sample(rng)
-        material = scene.material(
-            finishes.wall(rng, 0.3)
-            if kind == "wall"
-            else finishes.wood(rng)
-            if kind == "boards"
-            else finishes.metal_paint(rng)
-        )
-    inset = panel.width / 2 + 0.05 if isinstance(panel, Hedge) else 0.2
-    t = side.sign * (side.edge_m + inset)
-    s, number = start_m, 0
-    while s + panel.length < end_m:
-        step = panel.length / (1 - side.sign * side.edge_m * _curvature(course, s))
-        if not chance(rng, 0.12):
-            middle = s + step / 2 if isinstance(panel, Hedge) else s
-            turn = np.degrees(float(course.heading(s + step / 2) - course.heading(middle)))
-            parts = [("", panel, material)]
-            scene.add(
-                *by_the_street(
-                    f"fence {'LR'[side.sign < 0]}{number}", parts, course, middle, t, turn_deg=float(turn)
-                )
-            )
-        s += step
-        number += 1
-
-
-def _curvature(course: Course, s_m: float) -> float:
-    return float(course.heading(s_m + 2.0) - course.heading(s_m)) / 2.0
+        t = side.sign * (side.edge_m + 0.2)
+        shape = replace(Fence.sample(rng, kind, course), from_m=start_m, to_m=end_m, t_m=t)
+        material = finishes.fence(rng, kind)
+    name, worn = "fence " + "LR"[side.sign < 0], scene.material(material)
+    scene.add(standing(name, shape, worn, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
 
 
 def add_garden(
@@ -245,16 +207,8 @@ def add_garden(
     for number in range(integer(rng, 0, 10)):
         shrub = choose(rng, kinds)
         s, t = uniform(rng, start_m, end_m), side.sign * (side.edge_m + uniform(rng, 1.3, depth - 0.9))
-        scene.add(
-            *by_the_street(
-                f"shrub {'LR'[side.sign < 0]}{number}",
-                [("", shrub, leaves)],
-                course,
-                s,
-                t,
-                turn_deg=uniform(rng, 0.0, 360.0),
-            )
-        )
+        name, turn = f"shrub {'LR'[side.sign < 0]}{number}", uniform(rng, 0.0, 360.0)
+        scene.add(*by_the_street(name, [("", shrub, leaves)], course, s, t, turn_deg=turn))
 
 
 def add_skyline(rng: np.random.Generator, scene: Assembly, course: Course, sides: tuple[Side, Side]) -> None:
@@ -267,30 +221,6 @@ def add_skyline(rng: np.random.Generator, scene: Assembly, course: Course, sides
         side = choose(rng, sides)
         aside = uniform(rng, 0.0, 60.0) if ahead else side.front_m + uniform(rng, 45.0, 140.0)
         block = CityBlock.sample(rng)
-        _add_block(
-            scene,
-            f"block {number}",
-            course,
-            s,
-            side.sign * aside,
-            block,
-            uniform(rng, -30.0, 30.0),
-            choose(rng, materials),
-        )
-
-
-def _add_block(
-    scene: Assembly,
-    name: str,
-    course: Course,
-    s_m: float,
-    t_m: float,
-    block: CityBlock,
-    turn_deg: float,
-    material: int,
-) -> None:
-    """Beyond the street's end things stand along its straight continuation."""
-    end = min(s_m, course.end_m)
-    ahead = course.facing(end).apply((max(0.0, s_m - course.end_m), 0.0, 0.0))
-    place = vector(np.array(course.place(end, t_m)) + ahead)
-    scene.add(standing(name, block, material, [place], [course.facing(end, turn_deg)]))
+        turn, worn = uniform(rng, -30.0, 30.0), choose(rng, materials)
+        parts = [("", block, worn)]
+        scene.add(*by_the_street(f"block {number}", parts, course, s, side.sign * aside, turn_deg=turn))

@@ -76,7 +76,7 @@ def sample_drive(rng: np.random.Generator, config: DrivingConfig) -> Drive:
     view_m = uniform(rng, *config.view_m)
     reach = speed * (config.frames + 1) / 2
     bend = 0.0 if chance(rng, config.straight_share) else uniform(rng, *config.bend_deg)
-    course = Course.sample(rng, -reach - 30.0, reach + view_m, bend)
+    course = Course.sample(rng, -reach - 14.0, reach + view_m, bend)
     return Drive(
         course=course,
         frames=config.frames,

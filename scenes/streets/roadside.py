@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.drawing import chance, choose, uniform
+from scenes.drawing import chance, choose, integer, uniform
 from scenes.metric import MetricShape, standing
 from scenes.shapes.pedestrians import PersonDesign, PersonHair, PersonLegs, PersonSkin, PersonTop
 from scenes.shapes.street_furniture import (
@@ -31,6 +32,10 @@ from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive
 
+_Parts = list[tuple[str, MetricShape, int]]
+"""Name, shape and material of each part of a thing."""
+_FINE_M = 45.0
+"""Trees farther along the street than this have fewer leaves."""
 _LAMPS_LIT = 5
 """Street lamps that shine: those nearest to the rig; the others' light would hardly be seen."""
 
@@ -79,6 +84,7 @@ def add_lamps(
     post = scene.material(finishes.metal_paint(rng))
     glow = uniform(rng, 12.0, 30.0) if lit else 0.0
     glass = scene.material(finishes.lamp((255, 226, 190) if lit else (225, 226, 220), glow))
+    parts: _Parts = [("post", LampPost(design), post), ("light", LampLight(design), glass)]
     spacing = uniform(rng, *config.lamp_spacing_m)
     rows = pavements if chance(rng, 0.6) else (choose(rng, pavements),)
     sources: list[tuple[float, AreaLight]] = []
@@ -89,10 +95,6 @@ def add_lamps(
             pavement.free(s, t, 0.4)
             # The arm's x axis points over the street.
             turn = -90.0 if pavement.side.sign > 0 else 90.0
-            parts: list[tuple[str, MetricShape, int]] = [
-                ("post", LampPost(design), post),
-                ("light", LampLight(design), glass),
-            ]
             scene.add(
                 *by_the_street(
                     pavement.name("lamp", number), parts, drive.course, s, t, turn_deg=turn, z_m=ground_m
@@ -130,61 +132,57 @@ def add_trees(
     pavement: Pavement,
     ground_m: float,
 ) -> None:
-    """A row of trees of two or three individuals of a kind, and in parks more behind it."""
-    designs = [TreeDesign.sample(rng) for _ in range(2)]
+    """A row of trees on the pavement, some in front gardens, in parks several rows."""
     leaves, bark = scene.material(finishes.foliage(rng)), scene.material(finishes.bark(rng))
-    crowns = [TreeCrown(design, 70) for design in designs]
+    kinds = [_tree_parts(TreeDesign.sample(rng), leaves, bark) for _ in range(2)]
     park = not pavement.side.district.houses
-    rows = (
-        [("near_kerb", 0.9)] if pavement.width_m > 2.4 and chance(rng, pavement.side.district.trees) else []
-    )
-    rows += [("behind", 3.5), ("behind", 9.0), ("behind", 15.0)] if park else []
     depth = pavement.side.front_m - pavement.side.edge_m
-    rows += [("behind", min(depth / 2, 3.0))] if depth > 4.0 and not park and chance(rng, 0.6) else []
-    for row, (where, metres) in enumerate(rows):
-        spacing = uniform(rng, *config.tree_spacing_m) * (1.6 if where == "behind" and not park else 1.0)
+    # Distances from the pavement's far edge; negative ones are on the pavement.
+    rows = (
+        [0.9 - pavement.width_m]
+        if pavement.width_m > 2.4 and chance(rng, pavement.side.district.trees)
+        else []
+    )
+    rows += [3.5, 9.0, 15.0] if park else [min(depth / 2, 3.0)] if depth > 4.0 and chance(rng, 0.6) else []
+    for row, behind in enumerate(rows):
+        spacing = uniform(rng, *config.tree_spacing_m) * (1.0 if behind < 0 or park else 1.6)
         s, number = drive.course.start_m + uniform(rng, 1.0, spacing), 0
         while s < drive.course.end_m - 2.0:
-            at = s + (uniform(rng, -0.25, 0.25) * spacing if where == "behind" else 0.0)
-            t = pavement.near_kerb(metres) if where == "near_kerb" else pavement.near_wall(-metres)
+            at = s + (uniform(rng, -0.25, 0.25) * spacing if behind > 0 else 0.0)
+            t = pavement.near_wall(-behind)
+            near, far = choose(rng, kinds)
+            name, turn = pavement.name(f"tree {row}", number), uniform(rng, 0.0, 360.0)
             if pavement.free(at, t, 0.7):
-                _add_tree(
-                    rng,
-                    scene,
-                    drive,
-                    pavement.name(f"tree {row}", number),
-                    designs,
-                    crowns,
-                    leaves,
-                    bark,
-                    at,
-                    t,
-                    ground_m,
-                )
+                parts = far if at > _FINE_M else near
+                scene.add(*by_the_street(name, parts, drive.course, at, t, turn_deg=turn, z_m=ground_m))
             s += spacing
             number += 1
 
 
-def _add_tree(
-    rng: np.random.Generator,
-    scene: Assembly,
-    drive: Drive,
-    name: str,
-    designs: list[TreeDesign],
-    crowns: list[TreeCrown],
-    leaves: int,
-    bark: int,
-    s_m: float,
-    t_m: float,
-    ground_m: float,
-) -> None:
-    which = int(rng.integers(len(designs)))
-    parts: list[tuple[str, MetricShape, int]] = [("stem", TreeStem(designs[which]), bark)]
-    if designs[which].form != "bare":
-        parts.append(("crown", crowns[which], leaves))
-    scene.add(
-        *by_the_street(name, parts, drive.course, s_m, t_m, turn_deg=uniform(rng, 0.0, 360.0), z_m=ground_m)
-    )
+def _tree_parts(design: TreeDesign, leaves: int, bark: int) -> tuple[_Parts, _Parts]:
+    """The parts of a tree seen from near and from afar."""
+    stem: _Parts = [("stem", TreeStem(design), bark)]
+    if design.form == "bare":
+        return stem, stem
+    near, far = TreeCrown(design, 75), TreeCrown(design, 22)
+    return [*stem, ("crown", near, leaves)], [*stem, ("crown", far, leaves)]
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A kind of furniture: its parts and where on a pavement it belongs."""
+
+    name: str
+    share: float
+    parts: _Parts
+    reach_m: float
+    """Radius of the room it needs."""
+    from_kerb_m: float = 0.0
+    """Distance from the kerb; 0 for a piece that stands at the wall."""
+    from_wall_m: float = 0.0
+    turn_deg: float = 0.0
+    row_m: float = 0.0
+    """Distance between several in a row; 0 for a single one."""
 
 
 def add_furniture(
@@ -197,133 +195,44 @@ def add_furniture(
 ) -> None:
     """Signs, bollards, bins, benches, cabinets and shelters at random places of a pavement."""
     course = drive.course
-    grey, wooden = scene.material(finishes.metal_paint(rng)), scene.material(finishes.wood(rng))
-    signs = [SignPost.sample(rng) for _ in range(3)]
-    faces = [scene.material(finishes.sign_face(rng, sign.corners)) for sign in signs]
-    bollard, litter, bench, cabinet = (
-        kind.sample(rng) for kind in (Bollard, LitterBin, Bench, StreetCabinet)
-    )
+    pieces = _sample_pieces(rng, scene, pavement)
     length = course.end_m - course.start_m
-    count = rng.poisson(uniform(rng, *config.furniture_per_100m) * length / 100)
-    away = pavement.side.turn_deg()
-    for number in range(count):
-        kind = choose(
-            rng, ["sign", "bollards", "bin", "bench", "cabinet", "shelter"], [0.35, 0.2, 0.2, 0.1, 0.1, 0.05]
+    for number in range(rng.poisson(uniform(rng, *config.furniture_per_100m) * length / 100)):
+        piece = choose(rng, pieces, [piece.share for piece in pieces])
+        s = uniform(rng, course.start_m, course.end_m - 12.0)
+        turn = piece.turn_deg + uniform(rng, -6.0, 6.0)
+        t = (
+            pavement.near_kerb(piece.from_kerb_m)
+            if piece.from_kerb_m
+            else pavement.near_wall(piece.from_wall_m)
         )
-        s = uniform(rng, course.start_m, course.end_m - 8.0)
-        if kind == "sign":
-            which = int(rng.integers(3))
-            parts: list[tuple[str, MetricShape, int]] = [
-                ("post", signs[which], grey),
-                ("face", SignFace(signs[which]), faces[which]),
-            ]
-            _place(
-                scene,
-                pavement,
-                drive,
-                "sign",
-                number,
-                parts,
-                s,
-                pavement.near_kerb(0.45),
-                180.0 + uniform(rng, -12.0, 12.0),
-                ground_m,
-                0.4,
-            )
-        elif kind == "bollards":
-            for k in range(int(rng.integers(3, 9))):
-                name = 100 * (number + 1) + k
-                _place(
-                    scene,
-                    pavement,
-                    drive,
-                    "bollard",
-                    name,
-                    [("", bollard, grey)],
-                    s + 1.5 * k,
-                    pavement.near_kerb(0.4),
-                    0.0,
-                    ground_m,
-                    0.2,
-                )
-        elif kind == "bin":
-            _place(
-                scene,
-                pavement,
-                drive,
-                "bin",
-                number,
-                [("", litter, grey)],
-                s,
-                pavement.near_kerb(0.7),
-                away,
-                ground_m,
-                0.5,
-            )
-        elif kind == "bench":
-            _place(
-                scene,
-                pavement,
-                drive,
-                "bench",
-                number,
-                [("", bench, wooden)],
-                s,
-                pavement.near_wall(0.45),
-                away + 180.0,
-                ground_m,
-                1.2,
-            )
-        elif kind == "cabinet":
-            _place(
-                scene,
-                pavement,
-                drive,
-                "cabinet",
-                number,
-                [("", cabinet, grey)],
-                s,
-                pavement.near_wall(0.4),
-                away + 180.0,
-                ground_m,
-                0.8,
-            )
-        elif pavement.width_m > 2.6:
-            shelter = BusShelter.sample(rng)
-            _place(
-                scene,
-                pavement,
-                drive,
-                "shelter",
-                number,
-                [("", shelter, grey)],
-                s,
-                pavement.near_wall(0.5),
-                away + 180.0,
-                ground_m,
-                2.4,
-            )
+        for k in range(integer(rng, 3, 8) if piece.row_m else 1):
+            at = s + k * piece.row_m
+            name = pavement.name(piece.name, number) + (f".{k}" if piece.row_m else "")
+            if pavement.free(at, t, piece.reach_m):
+                scene.add(*by_the_street(name, piece.parts, course, at, t, turn_deg=turn, z_m=ground_m))
 
 
-def _place(
-    scene: Assembly,
-    pavement: Pavement,
-    drive: Drive,
-    what: str,
-    number: int,
-    parts: list[tuple[str, MetricShape, int]],
-    s_m: float,
-    t_m: float,
-    turn_deg: float,
-    ground_m: float,
-    reach_m: float,
-) -> None:
-    if pavement.free(s_m, t_m, reach_m):
-        scene.add(
-            *by_the_street(
-                pavement.name(what, number), parts, drive.course, s_m, t_m, turn_deg=turn_deg, z_m=ground_m
-            )
-        )
+def _sample_pieces(rng: np.random.Generator, scene: Assembly, pavement: Pavement) -> list[_Piece]:
+    grey, wooden = scene.material(finishes.metal_paint(rng)), scene.material(finishes.wood(rng))
+    facing = pavement.side.turn_deg() + 180.0
+    pieces = [
+        _Piece("bollard", 0.2, [("", Bollard.sample(rng), grey)], 0.2, from_kerb_m=0.4, row_m=1.5),
+        _Piece("bin", 0.2, [("", LitterBin.sample(rng), grey)], 0.5, from_kerb_m=0.7, turn_deg=facing),
+        _Piece("bench", 0.1, [("", Bench.sample(rng), wooden)], 1.2, from_wall_m=0.45, turn_deg=facing),
+        _Piece(
+            "cabinet", 0.1, [("", StreetCabinet.sample(rng), grey)], 0.8, from_wall_m=0.4, turn_deg=facing
+        ),
+    ]
+    for _ in range(3):
+        post = SignPost.sample(rng)
+        face = scene.material(finishes.sign_face(rng, post.corners))
+        parts: _Parts = [("post", post, grey), ("face", SignFace(post), face)]
+        pieces.append(_Piece("sign", 0.12, parts, 0.4, from_kerb_m=0.5, turn_deg=180.0))
+    if pavement.width_m > 2.6:
+        shelter = BusShelter.sample(rng)
+        pieces.append(_Piece("shelter", 0.05, [("", shelter, grey)], 2.4, from_wall_m=0.5, turn_deg=facing))
+    return pieces
 
 
 def add_traffic_lights(
@@ -341,7 +250,7 @@ def add_traffic_lights(
     post = scene.material(finishes.black_plastic())
     green = chance(rng, 0.5)
     lens = scene.material(finishes.lamp((40, 230, 120) if green else (250, 30, 24), 2.5))
-    parts: list[tuple[str, MetricShape, int]] = [
+    parts: _Parts = [
         ("post", light, post),
         ("lens", TrafficLightLens(light, green), lens),
     ]
@@ -380,43 +289,47 @@ def add_people(
 ) -> None:
     """People standing and walking along a pavement, each on a track of their own."""
     course = drive.course
-    designs = [PersonDesign.sample(rng) for _ in range(5)]
-    clothes = [scene.material(finishes.cloth(rng)) for _ in range(7)]
-    skins = [scene.material(finishes.skin(rng)) for _ in range(2)]
-    hairs = [scene.material(finishes.hair(rng)) for _ in range(2)]
+    wardrobe = _Wardrobe(rng, scene)
     length = course.end_m - course.start_m
-    for number in range(int(rng.poisson(uniform(rng, *config.pedestrians_per_100m) * length / 100))):
-        design = choose(rng, designs)
-        s = uniform(rng, course.start_m + 2.0, course.end_m - 6.0)
-        t = pavement.side.sign * uniform(
-            rng, pavement.side.kerb_m + 1.0, max(pavement.side.edge_m - 0.5, pavement.side.kerb_m + 1.05)
-        )
+    for number in range(rng.poisson(uniform(rng, *config.pedestrians_per_100m) * length / 100)):
+        s = uniform(rng, course.start_m + 1.0, course.end_m - 5.0)
+        low = pavement.side.kerb_m + 0.9
+        t = pavement.side.sign * uniform(rng, low, max(pavement.side.edge_m - 0.5, low + 0.05))
         walk = 0.0 if chance(rng, 0.2) else uniform(rng, 0.06, 0.16) * choose(rng, [1.0, -1.0])
-        travel = abs(walk) * (drive.frames + 1) / 2
-        parts: list[tuple[str, MetricShape, int]] = [
-            ("top", PersonTop(design), choose(rng, clothes)),
-            ("legs", PersonLegs(design), choose(rng, clothes)),
-            ("skin", PersonSkin(design), choose(rng, skins)),
-            ("hair", PersonHair(design), choose(rng, hairs)),
-        ]
         turn = (0.0 if walk > 0 else 180.0) if walk else uniform(rng, 0.0, 360.0)
-        if not (course.start_m + 1.0 < s - travel and s + travel < course.end_m - 1.0):
+        parts = wardrobe.dressed(rng)
+        travel = abs(walk) * (drive.frames + 1) / 2
+        inside = course.start_m + 1.0 < s - travel and s + travel < course.end_m - 1.0
+        if not inside or not pavement.free(s, t, 0.35, travel):
             continue
-        if not pavement.free(s, t, 0.35, travel):
-            continue
-        count = 1 if not walk else 2 + math.floor(2 * travel / 4.0)
-        times = (0.0,) if count == 1 else tuple(np.linspace(-1.0, float(drive.frames), count).tolist())
-        track = (
-            [s]
-            if count == 1
-            else (s + math.copysign(1.0, walk) * np.linspace(-travel, travel, count)).tolist()
-        )
+        count = 2 + math.floor(2 * travel / 4.0) if walk else 1
+        times = np.linspace(-1.0, float(drive.frames), count).tolist() if walk else [0.0]
+        steps = np.linspace(-travel, travel, count).tolist() if walk else [0.0]
+        track = [s + step * math.copysign(1.0, walk) for step in steps]
         places = [course.place(at, t, ground_m) for at in track]
         turns = [course.facing(at, turn) for at in track]
         name = pavement.name("person", number)
         scene.add(
-            *(
-                standing(f"{name} {part}", shape, material, places, turns, times)
-                for part, shape, material in parts
-            )
+            *(standing(f"{name} {part}", shape, worn, places, turns, times) for part, shape, worn in parts)
         )
+
+
+class _Wardrobe:
+    """A few bodies and clothes that the people of a pavement share."""
+
+    def __init__(self, rng: np.random.Generator, scene: Assembly) -> None:
+        designs = [PersonDesign.sample(rng) for _ in range(5)]
+        self.bodies = [(PersonTop(d), PersonLegs(d), PersonSkin(d), PersonHair(d)) for d in designs]
+        self.clothes = [scene.material(finishes.cloth(rng)) for _ in range(6)]
+        self.skins = [scene.material(finishes.skin(rng)) for _ in range(2)]
+        self.hairs = [scene.material(finishes.hair(rng)) for _ in range(2)]
+
+    def dressed(self, rng: np.random.Generator) -> _Parts:
+        top, legs, skin, hair = choose(rng, self.bodies)
+        above, below = rng.choice(len(self.clothes), 2, replace=False)
+        return [
+            ("top", top, self.clothes[int(above)]),
+            ("legs", legs, self.clothes[int(below)]),
+            ("skin", skin, choose(rng, self.skins)),
+            ("hair", hair, choose(rng, self.hairs)),
+        ]

@@ -191,4 +191,4 @@ def _repairs(
         patches.append(Stripe(s, s + long, t + wide, t - wide, shear=uniform(rng, -0.2, 0.2)))
     if patches:
         shape = RoadPaint(course, tuple(patches), road, thickness_m=0.003)
-        _lay(scene, "repairs", shape, scene.material(finishes.tiled(finishes.Asphalt.sample(rng, 256), 2.3)))
+        _lay(scene, "repairs", shape, scene.material(finishes.tarmac_patch(rng)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -17,15 +17,16 @@ from scenes.shapes.vehicles import (
     CarBody,
     CarDesign,
     CarGlass,
+    CargoBox,
     CarLamps,
     CarTrim,
-    CargoBox,
     VanBody,
     VanDesign,
     VanGlass,
     VanLamps,
     VanTrim,
     Wheel,
+    WheelSet,
 )
 from scenes.spec import SceneObject
 from scenes.streets import finishes
@@ -33,6 +34,7 @@ from scenes.streets.assembly import Assembly
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive, Lane
+from scenes.textures.streets import shade
 
 PARKING_M = 2.15
 """Width of a parking lane."""
@@ -40,6 +42,8 @@ _KEY_M = 4.0
 """Key poses of a moving vehicle are at most this far apart."""
 _TURN_KEY = 2.0
 """Key poses of a turning wheel are at most this far apart, radians."""
+_FINE_M = 40.0
+"""Standing vehicles farther along the street than this have coarser wheels."""
 _CAR_KINDS = ("hatchback", "hatchback", "saloon", "estate", "suv", "suv")
 
 
@@ -55,6 +59,8 @@ class Model:
     wheel_material: int
     wheels: tuple[tuple[float, float], ...]
     """x and y of each."""
+    wheel_sets: tuple[WheelSet, WheelSet]
+    """All wheels as one shape for a vehicle that stands: fine ones, and coarse ones for far away."""
     paint: Callable[[np.random.Generator], int]
 
 
@@ -89,6 +95,7 @@ def sample_fleet(rng: np.random.Generator, scene: Assembly, config: DrivingConfi
 def _car_model(rng: np.random.Generator, scene: Assembly, shared: dict[str, int], paints: list[int]) -> Model:
     design = CarDesign.sample(rng, choose(rng, _CAR_KINDS))
     wheel = Wheel(design.wheel_radius, uniform(rng, 0.19, 0.23), 0.66)
+    wheels = _wheel_places(design)
     return Model(
         length=design.length,
         parts=(
@@ -100,7 +107,8 @@ def _car_model(rng: np.random.Generator, scene: Assembly, shared: dict[str, int]
         painted=(("body", CarBody(design)),),
         wheel=wheel,
         wheel_material=scene.material(finishes.wheel(rng, wheel.radius, wheel.width)),
-        wheels=tuple((x, side * design.track) for x in design.axles for side in (1.0, -1.0)),
+        wheels=wheels,
+        wheel_sets=(WheelSet(wheel, wheels), WheelSet(replace(wheel, sides=12), wheels)),
         paint=lambda rng: choose(rng, paints),
     )
 
@@ -110,6 +118,7 @@ def _van_model(
 ) -> Model:
     design = VanDesign.sample(rng, kind)
     wheel = Wheel(design.wheel_radius, 0.23 if kind == "van" else 0.3, 0.66)
+    wheels = _wheel_places(design)
     parts: list[tuple[str, MetricShape, int]] = [
         ("glass", VanGlass(design), shared["glass"]),
         ("trim", VanTrim(design), shared["trim"]),
@@ -129,14 +138,19 @@ def _van_model(
         painted=(("body", VanBody(design)),),
         wheel=wheel,
         wheel_material=scene.material(finishes.wheel(rng, wheel.radius, wheel.width)),
-        wheels=tuple((x, side * design.track) for x in design.axles for side in (1.0, -1.0)),
+        wheels=wheels,
+        wheel_sets=(WheelSet(wheel, wheels), WheelSet(replace(wheel, sides=12), wheels)),
         paint=lambda rng: choose(rng, own),
     )
 
 
+def _wheel_places(design: CarDesign | VanDesign) -> tuple[tuple[float, float], ...]:
+    return tuple((x, side * design.track) for x in design.axles for side in (1.0, -1.0))
+
+
 def _livery(rng: np.random.Generator) -> Srgb:
     light = uniform(rng, 0.4, 0.95)
-    return finishes.shade(light, uniform(rng, 0.0, 0.16), uniform(rng, 0.0, 360.0))
+    return shade(light, uniform(rng, 0.0, 0.16), uniform(rng, 0.0, 360.0))
 
 
 def _vehicle(
@@ -157,6 +171,10 @@ def _vehicle(
     objects = [
         standing(f"{name} {part}", shape, material, places, turns, times) for part, shape, material in parts
     ]
+    if len(times) == 1:
+        wheels = model.wheel_sets[abs(s_m[0]) > _FINE_M]
+        objects.append(standing(f"{name} wheels", wheels, model.wheel_material, places, turns))
+        return tuple(objects)
     forward = 1.0 if turn_deg == 0.0 else -1.0
     start = uniform(rng, 0.0, 2 * math.pi)
     for number, (x, y) in enumerate(model.wheels):

@@ -19,7 +19,6 @@ from scenes.painting import (
     Srgb,
     colorize,
     finish,
-    flat_colors,
     mix,
     oklch_to_srgb,
     paint,

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenes.mesh import Mesh
+from scenes.metric import MetricShape
 from scenes.serialization import from_plain, to_plain
 from scenes.shapes import SHAPES
 from scenes.shapes.basic import Box, Ellipsoid
@@ -97,8 +98,11 @@ def test_two_draws_are_two_shapes(name: str) -> None:
 @pytest.mark.parametrize("name", SOLIDS)
 def test_texture_coordinates_are_in_local_units(name: str) -> None:
     """A texture is neither smeared nor squeezed: most of the surface is mapped at about its own size."""
-    mesh = drawn(name, 5).mesh()
-    corners, uv = mesh.vertices[mesh.triangles], mesh.corner_uv.astype(np.float64)
+    shape = drawn(name, 5)
+    mesh = shape.mesh()
+    # Shapes made to measure have theirs in metres.
+    size = shape.half_extent_m if isinstance(shape, MetricShape) else 1.0
+    corners, uv = size * mesh.vertices[mesh.triangles], mesh.corner_uv.astype(np.float64)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     one, two = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     painted = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
