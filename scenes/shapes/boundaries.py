@@ -23,7 +23,7 @@ _GATES = 0.1
 class Fence(MetricShape):
     """Panels of railings, pickets, boards, wire mesh or low wall along a street."""
 
-    kind: str
+    style: str
     course: Course
     from_m: float
     to_m: float
@@ -36,8 +36,8 @@ class Fence(MetricShape):
     seed: int
 
     @classmethod
-    def sample(cls, rng: np.random.Generator, kind: str | None = None, course: Course | None = None) -> Self:
-        kind = kind or choose(rng, FENCES)
+    def sample(cls, rng: np.random.Generator, style: str | None = None, course: Course | None = None) -> Self:
+        style = style or choose(rng, FENCES)
         course = course or sample_course(rng)
         low, high, near, wide = {
             "railing": (0.9, 1.4, 0.12, 0.17),
@@ -45,9 +45,9 @@ class Fence(MetricShape):
             "boards": (1.5, 1.9, 0.15, 0.22),
             "mesh": (1.3, 2.2, 0.2, 0.3),
             "wall": (0.5, 1.2, 0.3, 0.31),
-        }[kind]
+        }[style]
         return cls(
-            kind=kind,
+            style=style,
             course=course,
             from_m=course.start_m,
             to_m=course.end_m,
@@ -62,7 +62,7 @@ class Fence(MetricShape):
         rng = np.random.default_rng(self.seed)
         starts = np.arange(self.from_m, self.to_m - self.panel, self.panel)
         starts = starts[(rng.random(len(starts)) > _GATES) | (np.arange(len(starts)) == 0)]
-        vertices, triangles = self._mesh() if self.kind == "mesh" else boxes(*self._boxes())
+        vertices, triangles = self._mesh() if self.style == "mesh" else boxes(*self._boxes())
         count = len(vertices)
         along = (starts[:, None] + vertices[:, 0]).ravel()
         aside = np.tile(self.t_m + vertices[:, 1], len(starts))
@@ -75,16 +75,16 @@ class Fence(MetricShape):
     def _boxes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Low and high corners of one panel's boxes."""
         length, high = self.panel, self.height
-        if self.kind == "wall":
+        if self.style == "wall":
             low = np.array([(0.0, -0.12, -0.2), (-0.005, -0.16, high)])
             return low, np.array([(length - 0.004, 0.12, high + 0.01), (length - 0.011, 0.16, high + 0.09)])
         count = max(3, int(length / self.step))
         x = 0.05 + np.arange(count) * ((length - 0.05) / count)
-        wide = {"railing": 0.022, "picket": 0.075, "boards": 0.9 * length / count}[self.kind]
+        wide = {"railing": 0.022, "picket": 0.075, "boards": 0.9 * length / count}[self.style]
         bars_low = np.stack([x, np.full(count, -0.01), np.full(count, 0.06)], -1)
         bars_high = np.stack([x + wide, np.full(count, 0.01), np.full(count, high)], -1)
         rail_low = np.array([(0.0, 0.009, 0.2), (0.0, 0.009, high - 0.22)])
-        rail_high = rail_low + np.array((length - 0.003, 0.035, 0.03 if self.kind == "railing" else 0.06))
+        rail_high = rail_low + np.array((length - 0.003, 0.035, 0.03 if self.style == "railing" else 0.06))
         post_low, post_high = np.array([(-0.04, -0.045, -0.2)]), np.array([(0.045, 0.045, high + 0.06)])
         return np.concatenate([bars_low, rail_low, post_low]), np.concatenate(
             [bars_high, rail_high, post_high]
