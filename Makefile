@@ -7,6 +7,8 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CONSTRAINTS ?= constraints.txt
 PIP_FLAGS ?=
+# A file's tests share what they render, so a file stays with one process.
+PYTEST_FLAGS ?= -n auto --dist loadfile
 DEMO ?= demo
 BIN := .venv/bin
 # What Blender's library wants from the system, where it is not there already (Debian's names).
@@ -20,7 +22,7 @@ demo: .venv/.installed
 	$(BIN)/stereoforge demo --out $(DEMO)
 
 test: .venv/.installed-dev
-	$(BIN)/python -m pytest $(PYTEST_FLAGS)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(PYTEST_FLAGS)
 
 check: .venv/.installed-dev
 	$(BIN)/ruff check .
