@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.exposure import automatic_exposure, develop
+from datagen.final_pass import Sensor
 from datagen.ground_truth import (
     OcclusionTester,
     RectifiedPair,
@@ -62,6 +63,8 @@ class RenderOptions:
     """Larger forward differences are discontinuities: invalid as gradient targets."""
     targets: tuple[str, ...] = ()
     """Which of `EXTRA_TARGETS` to make."""
+    passes: tuple[str, ...] = ("clean",)
+    """Which of `RENDER_PASSES` to make."""
 
 
 @dataclass
@@ -98,6 +101,7 @@ def render_frames(
     """
     # Imported here so that planning, verifying and training work on a Python without Blender.
     from datagen.blender.build import build_world, place
+    from datagen.blender.final import render_final
     from datagen.blender.geometry import evaluated_triangles
     from datagen.blender.session import CyclesSettings, quiet, start_empty_file
     from datagen.blender.view import render_view
@@ -110,18 +114,24 @@ def render_frames(
             geometry = geometry or SceneGeometry(scene)
             settings = CyclesSettings(options.samples, options.device, options.threads)
             world = build_world(geometry, start_empty_file(settings))
-        extra_targets = ExtraTargets(geometry, options.targets)
+        extra_targets, sensor = ExtraTargets(geometry, options.targets), Sensor(scene)
         for frame in range(scene.frames):
             with watch.step("render"), quiet(log):
                 views = {eye: render_view(world, eye, frame, scratch) for eye in EYES}
+            if exposure is None:  # One exposure a scene: a camera does not flicker.
+                exposure = automatic_exposure(views["left"].radiance, scene.exposure_key)
+            images = {eye: {"clean": develop(view.radiance, exposure)} for eye, view in views.items()}
+            if "final" in options.passes:
+                with watch.step("render_final"), quiet(log):
+                    for eye, radiance in render_final(world, frame, exposure, scratch).items():
+                        light = sensor.expose(radiance, exposure, eye, frame)
+                        images[eye]["final"] = develop(light, 1.0)
             with watch.step("ground_truth"):
                 place(world, "left", frame)
                 tester = _occlusion_tester(scene, frame, evaluated_triangles())
-                if exposure is None:  # One exposure a scene: a camera does not flicker.
-                    exposure = automatic_exposure(views["left"].radiance, scene.exposure_key)
                 targets = {
                     eye: _targets(
-                        {"clean": develop(view.radiance, exposure)},
+                        {name: images[eye][name] for name in options.passes},
                         disparity_from_depth(view.depth_m, scene.camera.disparity_metres),
                         options.gradient_threshold_px,
                         tester.labels(eye, view.depth_m),

@@ -12,12 +12,10 @@ import numpy as np
 import yaml
 
 from datagen.errors import DatasetError
-from datagen.layout import EXTRA_TARGETS, SPLITS
+from datagen.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
 from scenes.serialization import from_plain, to_plain
 from storage import write_text
-
-PASSES = ("clean",)
 
 
 @dataclass(frozen=True)
@@ -43,8 +41,10 @@ class Recipe:
                 raise DatasetError(f"there is no split {split!r}; there are {', '.join(SPLITS)}")
             if count < 0:
                 raise DatasetError(f"the number of {split} scenes must not be negative, got {count}")
-        if not self.passes or not set(self.passes) <= set(PASSES):
-            raise DatasetError(f"passes must be among {', '.join(PASSES)}, got {', '.join(self.passes)!r}")
+        if not self.passes or not set(self.passes) <= set(RENDER_PASSES):
+            raise DatasetError(
+                f"passes must be among {', '.join(RENDER_PASSES)}, got {', '.join(self.passes)!r}"
+            )
         unknown = sorted(set(self.targets) - set(EXTRA_TARGETS))
         if unknown:
             raise DatasetError(

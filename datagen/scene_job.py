@@ -72,7 +72,7 @@ def _render_staged(job: SceneJob, watch: Stopwatch) -> SceneManifest:
         scene = job.recipe.sample(job.split, job.scene)
     recipe = job.recipe
     options = RenderOptions(
-        recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets
+        recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets, recipe.passes
     )
     statistics = []
     for frame, targets in render_frames(scene, job.staging, options, watch):

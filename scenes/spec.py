@@ -232,6 +232,7 @@ class Fog:
     """Homogeneous haze: over a distance of `visibility_m` the share 1/e of a surface's light is left."""
 
     color: Color
+    """What infinitely deep fog looks like in the picture, linear RGB, 0..1 (after exposure)."""
     visibility_m: float
 
 

@@ -69,6 +69,7 @@ def _build_objects(
                 shared[key] = mesh
         block = bpy.data.objects.new(thing.name, mesh)
         block.pass_index = index + 1
+        block.rotation_mode = "QUATERNION"
         blender_scene.collection.objects.link(block)
         block.matrix_world = Matrix(thing.pose(0.0).tolist())
         objects.append(block)
@@ -145,6 +146,7 @@ def _build_camera(camera: StereoCamera, blender_scene: bpy.types.Scene) -> bpy.t
     lens.clip_start = 1e-3
     lens.clip_end = 1e7
     block = bpy.data.objects.new("eye", lens)
+    block.rotation_mode = "QUATERNION"
     blender_scene.collection.objects.link(block)
     blender_scene.camera = block
     blender_scene.render.resolution_x = camera.width

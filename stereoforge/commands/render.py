@@ -42,7 +42,7 @@ class Render:
     samples: Annotated[int | None, shown("N", 4)] = None
     """Paths a pixel for the pictures, denoised; ground truth is exact whatever this is."""
     passes: Annotated[str | None, shown("LIST", "clean")] = None
-    """Render passes, comma-separated."""
+    """Render passes, comma-separated: clean, and final with motion blur, defocus, fog and sensor noise."""
     targets: Annotated[str | None, shown("all|LIST", "none")] = None
     """Targets besides disparity, gradient, occlusion and object index, comma-separated: material_index,
     normals, optical_flow, disparity_change, motion_boundaries."""
