@@ -74,7 +74,7 @@ def sample_driving(rng: np.random.Generator, config: DrivingConfig) -> Scene:
         materials=tuple(scene.materials),
         lights=lights,
         world=daylight.world,
-        exposure_key=uniform(rng, 0.12, 0.2) if daylight.dusk else uniform(rng, 0.18, 0.28),
+        exposure_key=uniform(rng, 0.12, 0.2) if daylight.dusk else uniform(rng, 0.2, 0.3),
         notes=_notes(drive, daylight.dusk),
     )
 

@@ -46,7 +46,7 @@ class TreeDesign:
             stem_radius=height * uniform(rng, 0.013, 0.024),
             crown_width=min(height * uniform(rng, *slim), 6.5),
             form=form,
-            leaf=uniform(rng, 0.22, 0.42),
+            leaf=uniform(rng, 0.18, 0.34),
             seed=new_seed(rng),
         )
 
@@ -94,7 +94,7 @@ class TreeStem(MetricShape):
         end = np.concatenate([[top], middles])
         thick = np.concatenate([[1.25 * radius], np.full(len(fork), 0.45 * radius)])
         thin = np.concatenate([[0.4 * radius], np.full(len(fork), 0.15 * radius)])
-        parts = [struts(start, end, thick, thin, 8)]
+        parts = [struts(start, end, thick, thin, 6)]
         if design.form == "bare":
             parts += self._twigs(rng, fork, middles)
         return Surface(*joined(*parts))

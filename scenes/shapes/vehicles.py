@@ -20,6 +20,9 @@ from scenes.spec import Vector
 
 _Part = tuple[Vertices, Triangles]
 
+MIRROR_M = 0.12
+"""How far door mirrors stand out of the body."""
+
 
 @dataclass(frozen=True)
 class CarDesign:
@@ -233,8 +236,8 @@ class CarBody(MetricShape):
 
     def _mirrors(self) -> _Part:
         x, half, z = self.design.windscreen[0] - 0.28, self.design.width / 2, self.design.belt_height
-        low = np.array([(x - 0.07, half - 0.12, z - 0.01), (x - 0.07, -half - 0.16, z - 0.01)])
-        return boxes(low, low + np.array((0.13, 0.28, 0.13)))
+        low = np.array([(x - 0.07, half - 0.16, z - 0.01), (x - 0.07, -half - MIRROR_M, z - 0.01)])
+        return boxes(low, low + np.array((0.13, 0.16 + MIRROR_M, 0.13)))
 
 
 @dataclass(frozen=True)
@@ -449,8 +452,8 @@ class VanBody(MetricShape):
         body = _pulled(design.profile(), design.width / 2, 0.07)
         body = _without_arches(body, design.axles, design.wheel_radius, design.width)
         x, half, z = design.screen_foot[0] - 0.1, design.width / 2, design.screen_foot[1] + 0.25
-        low = np.array([(x - 0.05, half - 0.03, z), (x - 0.05, -half - 0.22, z)])
-        return Surface(*joined(body, boxes(low, low + np.array((0.12, 0.25, 0.35)))))
+        low = np.array([(x - 0.05, half - 0.13, z), (x - 0.05, -half - MIRROR_M, z)])
+        return Surface(*joined(body, boxes(low, low + np.array((0.12, 0.13 + MIRROR_M, 0.35)))))
 
 
 @dataclass(frozen=True)

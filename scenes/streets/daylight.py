@@ -54,8 +54,8 @@ def _day(rng: np.random.Generator, overcast: bool) -> Daylight:
         sky = replace(
             sky, zenith=grey[0], horizon=grey[1], cloud=cloud, cloud_cover=uniform(rng, 0.75, 1.0), glow=0.1
         )
-        sun = _sun(azimuth, elevation, uniform(rng, 0.2, 1.0), 30.0, 0.0)
-        return Daylight((sun,), World(sky, uniform(rng, 0.9, 1.3)), False, 0.0)
+        sun = _sun(azimuth, elevation, uniform(rng, 0.9, 2.2), 50.0, 0.0)
+        return Daylight((sun,), World(sky, uniform(rng, 0.7, 1.0)), False, 0.0)
     blue = shade(uniform(rng, 0.5, 0.68), uniform(rng, 0.07, 0.13), uniform(rng, 240.0, 262.0))
     pale = shade(
         uniform(rng, 0.84, 0.93),
@@ -63,8 +63,8 @@ def _day(rng: np.random.Generator, overcast: bool) -> Daylight:
         uniform(rng, 60.0, 80.0) if chance(rng, 0.3) else 235.0,
     )
     sky = replace(sky, zenith=blue, horizon=pale, cloud=(248, 248, 248), cloud_cover=uniform(rng, 0.0, 0.7))
-    sun = _sun(azimuth, elevation, log_uniform(rng, 2.0, 5.0), log_uniform(rng, 0.5, 3.0), warmth)
-    return Daylight((sun,), World(sky, uniform(rng, 0.7, 1.1)), False, 0.0)
+    sun = _sun(azimuth, elevation, log_uniform(rng, 2.5, 5.0), log_uniform(rng, 0.5, 3.0), warmth)
+    return Daylight((sun,), World(sky, uniform(rng, 0.5, 0.85)), False, 0.0)
 
 
 def _dusk(rng: np.random.Generator) -> Daylight:

@@ -52,7 +52,7 @@ def plain(color: Srgb, *, roughness: float = 1.0, specular: float = 0.0, metalli
 
 
 def asphalt(rng: np.random.Generator) -> Material:
-    return tiled(Asphalt.sample(rng, 512), uniform(rng, 4.0, 5.5))
+    return tiled(Asphalt.sample(rng, 400), uniform(rng, 3.2, 4.4))
 
 
 def tarmac_patch(rng: np.random.Generator) -> Material:
@@ -122,7 +122,7 @@ def trim(rng: np.random.Generator) -> Material:
 
 def windows(rng: np.random.Generator, design: HouseDesign, frame: Srgb, lit: float) -> Material:
     panes = replace(
-        WindowPanes.sample(rng, 512), opening=design.opening, sill=design.sill, frame=frame, lit=lit
+        WindowPanes.sample(rng, 320), opening=design.opening, sill=design.sill, frame=frame, lit=lit
     )
     material = tiled(panes, WindowPanes.CELLS * NOMINAL_BAY_M)
     if lit:
@@ -201,7 +201,7 @@ def wheel(rng: np.random.Generator, radius_m: float, width_m: float) -> Material
 
 def lettering(rng: np.random.Generator, color: Srgb) -> Material:
     """The side of a lorry's box or of a bus: a colour with large words on it."""
-    glyphs = replace(GlyphRows.sample(rng, 256), lines=2, letters=integer(rng, 4, 6))
+    glyphs = replace(GlyphRows.sample(rng, 256), lines=4, letters=integer(rng, 7, 9), grain=0.015)
     ink = shade(0.3, 0.12, uniform(rng, 0.0, 360.0)) if sum(color) > 380 else shade(0.92, 0.02, 90.0)
     return replace(
         tiled(replace(glyphs, palette=(color, ink)), uniform(rng, 2.6, 3.4)), specular=0.4, roughness=0.4

@@ -318,7 +318,7 @@ class _Wardrobe:
     """A few bodies and clothes that the people of a pavement share."""
 
     def __init__(self, rng: np.random.Generator, scene: Assembly) -> None:
-        designs = [PersonDesign.sample(rng) for _ in range(5)]
+        designs = [PersonDesign.sample(rng) for _ in range(3)]
         self.bodies = [(PersonTop(d), PersonLegs(d), PersonSkin(d), PersonHair(d)) for d in designs]
         self.clothes = [scene.material(finishes.cloth(rng)) for _ in range(6)]
         self.skins = [scene.material(finishes.skin(rng)) for _ in range(2)]

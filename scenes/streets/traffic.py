@@ -14,6 +14,7 @@ from scenes.metric import MetricShape, standing
 from scenes.painting import Srgb
 from scenes.shapes.road import Course
 from scenes.shapes.vehicles import (
+    MIRROR_M,
     CarBody,
     CarDesign,
     CarGlass,
@@ -36,7 +37,7 @@ from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive, Lane
 from scenes.textures.streets import shade
 
-PARKING_M = 2.15
+PARKING_M = 2.35
 """Width of a parking lane."""
 _KEY_M = 4.0
 """Key poses of a moving vehicle are at most this far apart."""
@@ -52,6 +53,8 @@ class Model:
     """A make of vehicle: its parts with the materials all of its kind share, its wheels."""
 
     length: float
+    half_width: float
+    """With the mirrors."""
     parts: tuple[tuple[str, MetricShape, int], ...]
     painted: tuple[tuple[str, MetricShape], ...]
     """Parts that wear each vehicle's own paint."""
@@ -85,10 +88,8 @@ def sample_fleet(rng: np.random.Generator, scene: Assembly, config: DrivingConfi
     }
     paints = [scene.material(finishes.car_paint(rng)) for _ in range(9)]
     cars = [_car_model(rng, scene, shared, paints) for _ in range(4)]
-    large = [
-        _van_model(rng, scene, shared, paints, kind)
-        for kind in ("van", choose(rng, ["van", "lorry"]), choose(rng, ["lorry", "bus"]))
-    ]
+    kinds = choose(rng, [("van", "lorry"), ("van", "bus"), ("lorry", "bus"), ("van", "van")])
+    large = [_van_model(rng, scene, shared, paints, kind) for kind in kinds]
     return Fleet(cars, large, uniform(rng, *config.large_vehicle_share))
 
 
@@ -98,6 +99,7 @@ def _car_model(rng: np.random.Generator, scene: Assembly, shared: dict[str, int]
     wheels = _wheel_places(design)
     return Model(
         length=design.length,
+        half_width=design.width / 2 + MIRROR_M,
         parts=(
             ("glass", CarGlass(design), shared["glass"]),
             ("trim", CarTrim(design), shared["trim"]),
@@ -134,6 +136,7 @@ def _van_model(
         own = [scene.material(finishes.plain((228, 228, 224), roughness=0.25, specular=0.5))]
     return Model(
         length=design.length,
+        half_width=design.width / 2 + MIRROR_M,
         parts=tuple(parts),
         painted=(("body", VanBody(design)),),
         wheel=wheel,
@@ -248,7 +251,10 @@ def _add_lane(
             continue
         if lane == drive.lane and -9.0 < middle - math.copysign(model.length / 2, middle) < 5.0:
             continue  # the rig's own place
-        aside = uniform(rng, -0.2, 0.2)
+        room = drive.lane_m / 2 - model.half_width - _swing_m(course, model, middle - travel, middle + travel)
+        if room < 0.0:
+            continue
+        aside = uniform(rng, -1.0, 1.0) * min(room, 0.2)
         if speed_m == 0.0:
             path, times = (middle,), (0.0,)
         else:
@@ -257,6 +263,13 @@ def _add_lane(
             path = tuple((middle + lane.direction * np.linspace(-travel, travel, count)).tolist())
         scene.add(*_vehicle(rng, f"{name}.{number}", model, course, path, lane.t_m + aside, turn, times))
         number += 1
+
+
+def _swing_m(course: Course, model: Model, from_m: float, to_m: float) -> float:
+    """How far the straight sides of a vehicle leave its lane where the lane bends."""
+    s = np.arange(from_m - model.length / 2, to_m + model.length / 2 + 1.0, 1.0)
+    curvature = np.abs(np.gradient(course.heading(s), s)).max()
+    return float(curvature) * model.length**2 / 8
 
 
 def add_parked(
@@ -276,9 +289,10 @@ def add_parked(
     s, number = drive.course.start_m + 3.0, 0
     while True:
         model = fleet.draw(rng)
-        if model.length > 7.0:
-            continue
         middle = s + model.length / 2
+        if 2 * model.half_width + 0.04 > PARKING_M:
+            s += 0.1
+            continue
         if middle + model.length / 2 > drive.course.end_m - 2.0:
             return
         s += model.length + uniform(rng, 0.7, 1.8)
@@ -286,7 +300,10 @@ def add_parked(
             rng, taken
         ):
             continue
-        t = side.sign * (side.kerb_m - PARKING_M / 2 + uniform(rng, -0.08, 0.08))
+        room = PARKING_M / 2 - model.half_width - _swing_m(drive.course, model, middle, middle)
+        if room < 0.0:
+            continue
+        t = side.sign * (side.kerb_m - PARKING_M / 2 + uniform(rng, -1.0, 1.0) * room)
         turn = 0.0 if with_traffic != chance(rng, 0.12) else 180.0
         name = f"parked {'LR'[side.sign < 0]}{number}"
         scene.add(*_vehicle(rng, name, model, drive.course, (middle,), t, turn, (0.0,)))

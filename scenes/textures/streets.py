@@ -313,7 +313,7 @@ class Foliage(Texture):
     @classmethod
     def sample(cls, rng: np.random.Generator, size: int) -> Self:
         hue = uniform(rng, 112.0, 142.0) if chance(rng, 0.82) else uniform(rng, 45.0, 100.0)
-        chroma, base = uniform(rng, 0.06, 0.13), uniform(rng, 0.3, 0.42)
+        chroma, base = uniform(rng, 0.07, 0.13), uniform(rng, 0.4, 0.52)
         return cls(
             size=size,
             seed=new_seed(rng),
