@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -92,7 +92,7 @@ def render_frames(
     options: RenderOptions | None = None,
     watch: Stopwatch | None = None,
     geometry: SceneGeometry | None = None,
-) -> Iterator[tuple[int, dict[Eye, EyeTargets]]]:
+) -> Generator[tuple[int, dict[Eye, EyeTargets]], None, None]:
     """Yield (frame, both eyes' arrays) for every frame of a scene, frames counted from 0.
 
     scratch: an existing folder for Blender's temporary files and its log. geometry: the scene's, if it has

@@ -86,6 +86,19 @@ class SceneRayCaster:
             weights[met] = np.stack(parts, -1) / np.sum(parts, axis=0)[:, None]
         return SurfacePoints(triangle, weights)
 
+    def sees_back(
+        self, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
+    ) -> NDArray[np.bool_]:
+        """(N,) whether the left eye's pixels show a triangle from the side its corners run clockwise on."""
+        points, directions = (
+            self.surface_points("left", time_frames, rows, columns),
+            self._directions(rows, columns),
+        )
+        back = points.triangle >= 0
+        a, b, c = np.moveaxis(self._vertices[self._geometry.triangles[points.triangle[back]]], 1, 0)
+        back[back] = np.einsum("ij,ij->i", np.cross(b - a, c - a), directions[back]) > 0
+        return back
+
     def _directions(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
         camera = self._scene.camera
         pair = RectifiedPair(camera.width, camera.height, camera.focal_px, camera.baseline_m)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
+from datagen.curation import Curation
 from datagen.errors import DatasetError
 from datagen.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
@@ -34,6 +35,8 @@ class Recipe:
     """Targets besides disparity, gradient, occlusion and object index, which are always made."""
     gradient_threshold_px: float = 1.0
     """Jumps above this are discontinuities, masked out of the gradient targets."""
+
+    curation: Curation = field(default_factory=Curation)
 
     def __post_init__(self) -> None:
         for split, count in self.scenes.items():
@@ -71,9 +74,10 @@ class Recipe:
         settings = to_plain(replace(self, scenes={}))
         return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
-    def sample(self, split: str, index: int) -> Scene:
-        """The index-th scene of a split; splits and scenes draw from unrelated random streams."""
-        sequence = np.random.SeedSequence(self.seed, spawn_key=(SPLITS.index(split), index))
+    def sample(self, split: str, index: int, attempt: int = 0) -> Scene:
+        """The index-th scene of a split; splits, scenes and attempts draw from unrelated random streams."""
+        key = (SPLITS.index(split), index) + ((attempt,) if attempt else ())
+        sequence = np.random.SeedSequence(self.seed, spawn_key=key)
         return sample_scene(np.random.default_rng(sequence), self.family, self.world)
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -11,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from datagen.curation import TEXTURELESS, fault_before_rendering, is_textureless
+from datagen.errors import DatasetError
 from datagen.formats import (
     write_camera_data,
     write_flow,
@@ -26,6 +30,7 @@ from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME
 from datagen.layout import FIRST_FRAME, RENDER_PASSES, Direction, Eye, Layout
 from datagen.manifest import SceneManifest, file_entry, write_manifest
 from datagen.recipe import Recipe
+from datagen.scene_geometry import SceneGeometry
 from scenes import Scene, scene_to_json
 from storage import write_text
 
@@ -67,23 +72,43 @@ def render_scene(job: SceneJob) -> SceneManifest:
 
 
 def _render_staged(job: SceneJob, watch: Stopwatch) -> SceneManifest:
-    staged = Layout(job.staging)
-    with watch.step("sample"):
-        scene = job.recipe.sample(job.split, job.scene)
-    recipe = job.recipe
+    """Render the first attempt at the scene that is not degenerate."""
+    rejected: Counter[str] = Counter()
+    for attempt in range(job.recipe.curation.attempts):
+        with watch.step("sample"):
+            geometry = SceneGeometry(job.recipe.sample(job.split, job.scene, attempt))
+            fault = fault_before_rendering(geometry, job.recipe.curation)
+        frames = None if fault else _render_attempt(job, geometry, watch)
+        if frames is not None:
+            return _commit(job, watch, _scene_statistics(geometry.scene, frames, rejected))
+        rejected[fault or TEXTURELESS] += 1
+    reasons = ", ".join(f"{reason} ({count})" for reason, count in rejected.most_common())
+    raise DatasetError(
+        f"scene {job.name}: {job.recipe.curation.attempts} attempts were degenerate: {reasons}"
+    )
+
+
+def _render_attempt(
+    job: SceneJob, geometry: SceneGeometry, watch: Stopwatch
+) -> list[dict[str, float]] | None:
+    """Render and stage a scene; its frames' statistics, or None if its first picture is textureless."""
+    recipe, staged = job.recipe, Layout(job.staging)
     options = RenderOptions(
         recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets, recipe.passes
     )
-    statistics = []
-    for frame, targets in render_frames(scene, job.staging, options, watch):
-        with watch.step("write"):
-            for eye, arrays in targets.items():
-                _write_eye(staged, job, eye, FIRST_FRAME + frame, arrays)
-            statistics.append(_frame_statistics(targets["left"]))
+    statistics: list[dict[str, float]] = []
+    with closing(render_frames(geometry.scene, job.staging, options, watch, geometry)) as frames:
+        for frame, targets in frames:
+            if frame == 0 and is_textureless(next(iter(targets["left"].images.values())), recipe.curation):
+                return None
+            with watch.step("write"):
+                for eye, arrays in targets.items():
+                    _write_eye(staged, job, eye, FIRST_FRAME + frame, arrays)
+                statistics.append(_frame_statistics(targets["left"]))
     with watch.step("write"):
-        _write_scene_files(staged, job, scene)
+        _write_scene_files(staged, job, geometry.scene)
     (job.staging / BLENDER_LOG).unlink()
-    return _commit(job, watch, _scene_statistics(scene, statistics))
+    return statistics
 
 
 _EXTRA_WRITERS: dict[str, Callable[[Path, Any], None]] = {
@@ -132,10 +157,10 @@ def _frame_statistics(left: EyeTargets) -> dict[str, float]:
     }
 
 
-def _scene_statistics(scene: Scene, frames: list[dict[str, float]]) -> dict[str, Any]:
-    """Counts, and the means over the frames of what was measured in the left eye."""
+def _scene_statistics(scene: Scene, frames: list[dict[str, float]], rejected: Counter[str]) -> dict[str, Any]:
+    """Counts, the means over the frames of what was measured in the left eye, and what was rejected why."""
     means = {key: round(float(np.mean([frame[key] for frame in frames])), 5) for key in frames[0]}
-    return {"objects": len(scene.objects), "frames": scene.frames, **means}
+    return {"objects": len(scene.objects), "frames": scene.frames, **means, "rejected": dict(rejected)}
 
 
 def _commit(job: SceneJob, watch: Stopwatch, statistics: dict[str, Any]) -> SceneManifest:
