@@ -36,6 +36,8 @@ class Recipe:
     gradient_threshold_px: float = 1.0
     """Jumps above this are discontinuities, masked out of the gradient targets."""
 
+    curriculum_scenes: int = 0
+    """Over so many scenes of each split the worlds grow from few and simple to the family's own; 0 for none."""
     curation: Curation = field(default_factory=Curation)
 
     def __post_init__(self) -> None:
@@ -62,6 +64,13 @@ class Recipe:
         for name, value in at_least_one.items():
             if value < 1:
                 raise DatasetError(f"{name} must be at least 1, got {value}")
+        if self.curriculum_scenes < 0:
+            raise DatasetError(f"curriculum_scenes must not be negative, got {self.curriculum_scenes}")
+        if self.curriculum_scenes:
+            try:
+                self.world.at_complexity(0.0)
+            except ValueError as error:
+                raise DatasetError(str(error)) from error
         if self.seed < 0:
             raise DatasetError(f"the seed must not be negative, got {self.seed}")
 
@@ -78,7 +87,10 @@ class Recipe:
         """The index-th scene of a split; splits, scenes and attempts draw from unrelated random streams."""
         key = (SPLITS.index(split), index) + ((attempt,) if attempt else ())
         sequence = np.random.SeedSequence(self.seed, spawn_key=key)
-        return sample_scene(np.random.default_rng(sequence), self.family, self.world)
+        world = self.world
+        if index < self.curriculum_scenes:
+            world = world.at_complexity(index / self.curriculum_scenes)
+        return sample_scene(np.random.default_rng(sequence), self.family, world)
 
 
 def recipe_from_plain(data: Any, origin: str) -> Recipe:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -21,6 +21,15 @@ class FamilyConfig:
     """Image height, pixels."""
     frames: int = 1
     """Frames per scene."""
+
+    def at_complexity(self, complexity: float) -> Self:
+        """This config made simpler: fewer and plainer things at 0, as it is at 1 (for curricula).
+
+        Raises ValueError for a family that cannot.
+        """
+        if complexity == 1:
+            return self
+        raise ValueError(f"{type(self).__name__} has no simpler worlds, so there is no curriculum for it")
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ of a rig with a small baseline look like those of one with a large baseline.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from scenes.shapes import SHAPES
 from scenes.shapes.organic import Terrain
 from scenes.spec import (
     AreaLight,
+    FinalPass,
     Light,
     Material,
     Scene,
@@ -80,8 +81,25 @@ class FlyingThingsConfig(FamilyConfig):
     area_lights: Count = (0, 4)
     sky_strength: Range = (0.7, 1.8)
     """Brightness of the sky's light."""
+    shutter_frames: Range = (0.2, 0.7)
+    """How long the final pass's shutter is open."""
+    defocus: Range = (0.0, 0.008)
+    """Diameter of the final pass's blur of the horizon, as a share of the image width."""
+
+    complexity: float = 1.0
+    """0 few things of plain shapes, 1 as many and as complicated as the other ranges say."""
+
+    def at_complexity(self, complexity: float) -> FlyingThingsConfig:
+        return replace(self, complexity=complexity * self.complexity)
+
+    def count(self, rng: np.random.Generator, limits: Count) -> int:
+        """Draw how many there are of something: at complexity 0 a tenth, but at least one of any."""
+        drawn = integer(rng, *limits)
+        return max(min(drawn, 1), round(drawn * (0.1 + 0.9 * self.complexity)))
 
     def __post_init__(self) -> None:
+        if not 0 <= self.complexity <= 1:
+            raise ValueError(f"flying_things: complexity must be from 0 to 1, got {self.complexity}")
         for name, value in vars(self).items():
             if isinstance(value, tuple) and value[0] > value[1]:
                 raise ValueError(f"flying_things: {name} must be (low, high), got {value}")
@@ -161,6 +179,7 @@ def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -
         world=World(Sky.sample(rng, 1024), uniform(rng, *config.sky_strength)),
         exposure_key=uniform(rng, 0.18, 0.32),
         notes={"flying_objects": float(len(flyers)), "background_objects": float(len(background))},
+        final=_final(rng, rig),
     )
 
 
@@ -183,6 +202,17 @@ def _sample_rig(rng: np.random.Generator, config: FlyingThingsConfig) -> _Rig:
     )
     camera = StereoCamera(config.width, config.height, focal_mm, baseline_m, motion)
     return _Rig(camera, config, camera.pose("left", (config.frames - 1) / 2))
+
+
+def _final(rng: np.random.Generator, rig: _Rig) -> FinalPass:
+    """The published final pass: motion blur, and a lens focused among the things in flight."""
+    camera = rig.camera
+    focus_m = log_uniform(rng, 1.5, 6.0) * rig.nearest_m
+    # A lens of diameter D focused at s spreads the horizon over D * focal_px / s.
+    blur_px = uniform(rng, *rig.config.defocus) * camera.width
+    diameter_m = blur_px * focus_m / camera.focal_px
+    f_number = camera.focal_mm / 1000 / diameter_m if diameter_m > 0 else 0.0
+    return FinalPass(uniform(rng, *rig.config.shutter_frames), f_number, focus_m)
 
 
 def _sample_land(rng: np.random.Generator, rig: _Rig) -> _Land:
@@ -218,6 +248,8 @@ def _ground(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Ma
 
 _STANDING: dict[str, float] = {"Box": 0.3, "DeformedCylinder": 0.2, "Cylinder": 0.08}
 """Shares of the background's plain kinds; the rest is of any kind."""
+_PLAIN: dict[str, float] = {"Box": 0.4, "Cylinder": 0.3, "Superquadric": 0.3}
+"""What all flying objects are at complexity 0, fewer and fewer up to 1."""
 
 
 def _sample_shape(rng: np.random.Generator, plain: dict[str, float] | None = None) -> Shape:
@@ -236,9 +268,9 @@ def _background(
 ) -> list[SceneObject]:
     """Objects standing or lying on the ground in view, near ones small, far ones up to skyline size."""
     first = len(materials)
-    kinds = integer(rng, *rig.config.background_materials)
+    kinds = rig.config.count(rng, rig.config.background_materials)
     materials.extend(sample_material(rng, 0.08 * rig.camera.width) for _ in range(kinds))
-    count = integer(rng, *rig.config.background_objects)
+    count = rig.config.count(rng, rig.config.background_objects)
     depths_m = [rig.depth(uniform(rng, *rig.config.background_disparity_share)) for _ in range(count)]
     spots = np.array([rig.point(uniform(rng, -1.25, 1.25), 0.0, depth_m) for depth_m in depths_m])
     spots = spots.reshape(-1, 3)
@@ -262,7 +294,7 @@ def _background(
 
 
 def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]) -> list[SceneObject]:
-    count = integer(rng, *rig.config.flying_objects)
+    count = rig.config.count(rng, rig.config.flying_objects)
     # `count` objects of this cover each leave 1 - flying_cover of the image free, if placed independently.
     each = 1 - (1 - uniform(rng, *rig.config.flying_cover)) ** (1 / max(count, 1))
     flyers = []
@@ -279,7 +311,7 @@ def _flyer(
 ) -> SceneObject:
     """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth."""
     config = rig.config
-    shape = _sample_shape(rng)
+    shape = _sample_shape(rng, {name: share * (1 - config.complexity) for name, share in _PLAIN.items()})
     stretch = rng.uniform(0.8, 1.25, 3)
     near_share = config.disparity_share[1]
     depth_m = rig.depth(uniform(rng, min(0.15 * near_share, near_share), near_share))

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dataset
+from datagen.estimate import estimate_run
 from datagen.layout import EXTRA_TARGETS
 from datagen.manifest import SceneManifest
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console, progress_bar
-from stereoforge.values import parse_shard, parse_size, shown
+from stereoforge.values import parse_shard, parse_size, shown, shown_duration
 
 DEFAULT_FAMILY = "flying_things"
 DEFAULT_SCENES = 20
@@ -56,11 +57,17 @@ class Render:
     """Render only scenes I, I + N, I + 2N, ..., so that N machines can share a folder."""
     recipe: Annotated[Path | None, shown("FILE", "none")] = None
     """A recipe.yaml to render."""
+    dry_run: bool = False
+    """Say what would be rendered, how long it would take and how much disk, measured on one frame of one
+    scene; nothing is written."""
 
     def run(self) -> None:
         recipe = self._recipe()
         if self.workers is not None and self.workers < 1:
             raise UsageError(f"--workers must be at least 1, got {self.workers}")
+        if self.dry_run:
+            self._estimate(recipe)
+            return
         summary = self._render(recipe)
         console.print(
             f"{self.out}: {summary.rendered} scenes rendered, {summary.already_there} were there already"
@@ -69,6 +76,29 @@ class Render:
             for scene, reason in summary.failures:
                 console.print(f"  {scene}: {reason}", markup=False)
             raise CommandError(f"{len(summary.failures)} scenes of {self.out} could not be rendered")
+
+    def _estimate(self, recipe: Recipe) -> None:
+        found = estimate_run(recipe, self.out, device=self.device, shard=parse_shard(self.shard))
+        splits = ", ".join(f"{count} {split}" for split, count in found.missing.items()) or "no"
+        console.print(
+            f"{self.out}: {splits} scenes of {recipe.family} to render, {found.already_there} are there already"
+        )
+        if found.frames:
+            world, kinds = (
+                recipe.world,
+                ("disparity", "gradient", "occlusion", "object_index", *recipe.targets),
+            )
+            console.print(
+                f"  {found.frames} stereo pairs of {world.width}x{world.height} in the passes "
+                f"{', '.join(recipe.passes)}, with {', '.join(kinds)}"
+            )
+            console.print(
+                f"  about {shown_duration(found.seconds)} on all cores of this machine, "
+                f"{found.scene_seconds:.1f} s a scene"
+            )
+            console.print(
+                f"  about {found.bytes / 1e6:,.0f} MB of disk, {found.scene_bytes / 1e6:.1f} MB a scene"
+            )
 
     def _render(self, recipe: Recipe) -> RenderSummary:
         with progress_bar() as progress:

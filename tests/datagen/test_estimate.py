@@ -1,0 +1,91 @@
+"""Recipes that ship, dry runs and curricula."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
+from datagen.estimate import estimate_run
+from datagen.layout import Layout
+from datagen.manifest import read_manifest
+from scenes import FAMILIES
+from scenes.shapes.basic import Box, Superquadric
+from scenes.shapes.revolved import Cylinder
+from stereoforge.values import shown_duration
+
+RECIPES = sorted((Path(__file__).parents[2] / "recipes").glob("*.yaml"))
+WORLD = FAMILIES["flying_things"].config(
+    width=96,
+    height=54,
+    frames=2,
+    flying_objects=(3, 3),
+    background_objects=(4, 4),
+    background_materials=(2, 2),
+)
+RECIPE = Recipe(WORLD, {"train": 3, "test": 2}, samples=1)
+
+
+@pytest.mark.parametrize("path", RECIPES, ids=lambda path: path.stem)
+def test_shipped_recipes_are_valid_and_give_scenes(path: Path) -> None:
+    recipe = read_recipe(path)
+    assert recipe.sample("train", 0).family == recipe.family
+
+
+def test_there_is_a_recipe_and_a_quick_one_for_each_family() -> None:
+    recipes = {path.stem: read_recipe(path) for path in RECIPES}
+    for family in FAMILIES:
+        quick = [name.startswith("cpu_") for name, recipe in recipes.items() if recipe.family == family]
+        assert {True, False} <= set(quick), family
+
+
+def test_a_dry_run_counts_what_is_missing_and_measures_one_frame(tmp_path: Path) -> None:
+    root = tmp_path / "set"
+    before = estimate_run(RECIPE, root)
+    assert not root.exists()
+    assert (before.missing, before.already_there, before.frames) == ({"train": 3, "test": 2}, 0, 10)
+    render_dataset(replace(RECIPE, scenes={"train": 2}), root, workers=1)
+    sizes = [
+        sum(entry.size for entry in read_manifest(Layout(root).manifest("train", scene)).files)
+        for scene in (0, 1)
+    ]
+    assert before.scene_bytes == pytest.approx(np.mean(sizes), rel=0.3)
+    assert before.seconds == 5 * before.scene_seconds > 0
+    sharded = estimate_run(RECIPE, root, shard=(1, 2))
+    assert (sharded.missing, sharded.already_there) == ({"train": 0, "test": 1}, 1)
+    done = estimate_run(replace(RECIPE, scenes={"train": 2}), root)
+    assert (done.frames, done.seconds, done.bytes) == (0, 0, 0)
+    assert len(StereoDataset(root, "train")) == 4
+
+
+def test_a_curriculum_goes_from_few_and_plain_to_the_family_s_own() -> None:
+    world = FAMILIES["flying_things"].config(flying_objects=(20, 20), background_objects=(50, 50))
+    recipe = Recipe(world, {"train": 10}, curriculum_scenes=8)
+    scenes = [recipe.sample("train", index) for index in (0, 4, 8)]
+    flying = [scene.notes["flying_objects"] for scene in scenes]
+    assert flying == [2, 11, 20]
+    assert [scene.notes["background_objects"] for scene in scenes] == [5, 28, 50]
+    plain = [
+        np.mean(
+            [isinstance(thing.shape, Box | Cylinder | Superquadric) for thing in scene.objects[-int(count) :]]
+        )
+        for scene, count in zip(scenes, flying, strict=True)
+    ]
+    assert plain[0] == 1 > plain[2]
+    # Scenes after the ramp are those of the recipe without one, whatever the set's size.
+    assert scenes[2] == replace(recipe, curriculum_scenes=0).sample("train", 8)
+
+
+def test_a_family_without_simpler_worlds_refuses_a_curriculum() -> None:
+    with pytest.raises(DatasetError, match="no curriculum"):
+        Recipe(FAMILIES["driving"].config(), {"train": 1}, curriculum_scenes=5)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(6.6, "7 s"), (200, "3 min 20 s"), (7530, "2 h 5 min"), (360000, "100 h 0 min")]
+)
+def test_durations_read_well(seconds: float, text: str) -> None:
+    assert shown_duration(seconds) == text
