@@ -13,20 +13,24 @@ from scenes.spec import Deformation
 
 @dataclass(frozen=True)
 class Sway(Deformation):
-    """A periodic bend that grows with the square of the height above the base (z = -1)."""
+    """A periodic bend that grows with the square of the distance from the root along z."""
 
     amplitude: float
-    """Sideways displacement of the top (z = 1), in mesh coordinates."""
+    """Sideways displacement of the tip, in mesh coordinates."""
     direction_deg: float
     """Heading of the sway in the xy plane."""
     period_frames: float
     phase: float = 0.0
     """Where in its period the motion is at frame 0, 0..1."""
+    root: float = -1.0
+    """z of the root, in mesh coordinates; what is on its other side stands still."""
+    tip: float = 1.0
+    """z of the tip; below the root for what hangs."""
 
     def deformed(self, vertices: NDArray[np.float64], time_frames: float) -> NDArray[np.float64]:
         heading = math.radians(self.direction_deg)
         swing = self.amplitude * math.sin(2 * math.pi * (time_frames / self.period_frames + self.phase))
-        share = ((vertices[:, 2] + 1) / 2) ** 2
+        share = np.maximum((vertices[:, 2] - self.root) / (self.tip - self.root), 0.0) ** 2
         moved = vertices.copy()
         moved[:, 0] += swing * math.cos(heading) * share
         moved[:, 1] += swing * math.sin(heading) * share

@@ -1,0 +1,355 @@
+"""Soft, furry creatures among plants: the world of Monkaa (Mayer et al. 2016), with creatures of our own.
+
+One or more creatures with limbs, tails and eyes, walking or gesturing, in a jungle, a meadow, a grove of
+giant mushrooms or a cave; plants that sway; coloured lamps; a camera that drifts. Lengths are in units of
+the distance of the creature the scene is about, a few metres.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenes.drawing import Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.family import Family
+from scenes.figures import Coat, Figure, sample_creature
+from scenes.lights import sample_area_light, sample_light_color, sample_sun
+from scenes.motion import vector
+from scenes.outdoors import (
+    Count,
+    Land,
+    LandscapeConfig,
+    half_height,
+    linear,
+    sample_camera,
+    sample_final,
+    sample_focus,
+)
+from scenes.planting import Garden, anywhere, boulders, grass, mushrooms, plants, trees, undergrowth
+from scenes.shapes.landforms import Cavern, Dripstone, Landscape
+from scenes.shapes.plants import Bush, Palm, Tree, Vine
+from scenes.spec import AreaLight, Light, Scene, World
+from scenes.stage import Spot, Stage
+from scenes.stuffs import Stuff, eye, fur, ground, hide, horn, leaves, rock
+from scenes.textures.sky import Sky
+from scenes.tones import DRY_GRASS, EARTH, FOLIAGE, MOSS, ROCK, VIVID
+
+PLACES = ("jungle", "meadow", "mushrooms", "cave")
+
+
+@dataclass(frozen=True)
+class MonkaaConfig(LandscapeConfig):
+    """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+
+    creatures: Count = (1, 4)
+    """Creatures per scene; the first is what the scene is about."""
+    focus_distance_m: Range = (2.5, 6.0)
+    """Distance of that creature."""
+    fur_locks: Count = (2000, 5500)
+    """Locks of fur on a furry creature; three in four are furry, the others have bare skin."""
+    undergrowth: Count = (30, 60)
+    """Ferns, bushes and broad-leaved plants per scene."""
+    grass_tufts: Count = (30, 70)
+    """Tufts of grass per scene."""
+    trees: Count = (6, 14)
+    """Trees and palms per scene, giant mushrooms among mushrooms, dripstones in caves."""
+    boulders: Count = (6, 20)
+    """Stones per scene."""
+    cave_share: float = 0.2
+    """Share of the scenes that are in a cave, 0..1."""
+    lamps: Count = (1, 4)
+    """Coloured soft lamps per scene."""
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What is decided before anything is placed."""
+
+    place: str
+    depth_m: float
+    """Of the creature the scene is about; the unit of all lengths."""
+    size_m: float
+    """Its height."""
+    stage: Stage
+
+
+def sample_monkaa(rng: np.random.Generator, config: MonkaaConfig) -> Scene:
+    """Draw one scene."""
+    plan = _sample_plan(rng, config)
+    stage = plan.stage
+    sky = Sky.sample(rng, 1024)
+    stage.ground(rng, _floor(plan.place), 1.5 * plan.depth_m)
+    cave = _cave(rng, plan) if plan.place == "cave" else None
+    creatures = _creatures(rng, config, plan)
+    garden = Garden(stage, plan.depth_m, anywhere if cave is None else cave.holds)
+    _FURNISH[plan.place](rng, config, plan)
+    foliage = [leaves() for _ in range(4)]
+    if chance(rng, 0.5):
+        foliage.append(leaves(VIVID))
+    undergrowth(rng, garden, integer(rng, *config.undergrowth), foliage)
+    grass(rng, garden, integer(rng, *config.grass_tufts), (FOLIAGE, FOLIAGE, DRY_GRASS))
+    boulders(rng, garden, "boulder", integer(rng, *config.boulders), (rock(), rock()))
+    base = Scene(
+        family="monkaa",
+        frames=config.frames,
+        camera=stage.camera,
+        objects=(),
+        materials=(),
+        lights=_lights(rng, config, plan, cave),
+        world=World(sky, uniform(rng, *config.sky_strength)),
+        exposure_key=uniform(rng, 0.2, 0.32),
+        final=sample_final(
+            rng, plan.depth_m, linear(sky.horizon), config.fog_share, (2.5 * plan.depth_m, 20 * plan.depth_m)
+        ),
+        notes={"creatures": float(creatures), "place": float(PLACES.index(plan.place))},
+    )
+    return stage.scene(base)
+
+
+def _sample_plan(rng: np.random.Generator, config: MonkaaConfig) -> _Plan:
+    place = "cave" if chance(rng, config.cave_share) else choose(rng, PLACES[:3], (0.45, 0.3, 0.25))
+    depth_m, focal_mm = uniform(rng, *config.focus_distance_m), uniform(rng, *config.focal_mm)
+    size_m = uniform(rng, *config.focus_height_share) * 2 * half_height(focal_mm, config) * depth_m
+    land = _sample_land(rng, place, depth_m)
+    focus = sample_focus(rng, config, focal_mm, depth_m, size_m, uniform(rng, 0.45, 1.1) * size_m)
+    camera = sample_camera(rng, config.width, config.height, config.frames, land, focus)
+    return _Plan(place, depth_m, size_m, Stage(land, camera, config.frames, 1.15 * focus.nearest_m))
+
+
+def _sample_land(rng: np.random.Generator, place: str, depth_m: float) -> Land:
+    steep = place in ("jungle", "cave")
+    shape = Landscape(
+        relief=uniform(rng, 0.25, 0.5) if steep else uniform(rng, 0.05, 0.3),
+        roll=uniform(rng, 0.001, 0.006),
+        clearing=uniform(rng, 0.12, 0.3),
+        frequency=uniform(rng, 3.0, 8.0),
+        octaves=6,
+        ridged=uniform(rng, 0.0, 0.8),
+        cells=90,
+        concentration=2.2,
+        seed=new_seed(rng),
+    )
+    return Land(shape, uniform(rng, 14.0, 24.0) * depth_m)
+
+
+def _floor(place: str) -> Stuff:
+    return {
+        "jungle": ground(MOSS),
+        "meadow": ground(FOLIAGE),
+        "mushrooms": ground(MOSS),
+        "cave": rock(ROCK, EARTH),
+    }[place]
+
+
+def _creatures(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> int:
+    """The one the scene is about before the camera, the others about it; returns how many there are."""
+    stage, placed = plan.stage, 0
+    for index in range(integer(rng, *config.creatures)):
+        furry = chance(rng, 0.75)
+        figure = sample_creature(
+            rng,
+            Coat(
+                tufts=integer(rng, *config.fur_locks) if furry else 0,
+                tuft_length=log_uniform(rng, 0.025, 0.09),
+                cells=54 if index == 0 else 40,
+            ),
+        )
+        size_m = plan.size_m if index == 0 else plan.size_m * log_uniform(rng, 0.4, 1.1)
+        scale_m = size_m / max(figure.height, 0.75 * figure.reach)
+        if index == 0:
+            right = uniform(rng, -0.35, 0.35)
+            spot = stage.spot(right, plan.depth_m, _towards_camera(rng, 1.0))
+        else:
+            spot = stage.spot(
+                uniform(rng, -0.85, 0.85), plan.depth_m * uniform(rng, 0.85, 2.6), _towards_camera(rng, 2.2)
+            )
+        stuffs = _creature_materials(rng, stage, figure, fur if furry else hide, scale_m, spot.depth_m)
+        # The one the scene is about stands where it must: the camera was set up for it.
+        placed += stage.figure(f"creature {index}", figure, stuffs, spot, scale_m, checked=index > 0)
+        if index == 0:
+            wide = figure.reach * scale_m / (plan.depth_m * stage.half_view[0])
+            stage.keep_free(right, 0.7 * wide, plan.depth_m)
+    return placed
+
+
+def _towards_camera(rng: np.random.Generator, spread_rad: float) -> float:
+    return -math.pi / 2 + uniform(rng, -spread_rad, spread_rad)
+
+
+def _creature_materials(
+    rng: np.random.Generator, stage: Stage, figure: Figure, coat: Stuff, scale_m: float, depth_m: float
+) -> dict[str, int]:
+    half_m = 0.5 * scale_m
+    gloss = 0.0 if coat is fur or chance(rng, 0.5) else 0.4
+    worn = {
+        "fur": stage.wear(rng, coat, half_m, depth_m, gloss=gloss),
+        "eye": stage.wear(rng, eye, half_m, depth_m, size=128, gloss=0.5),
+    }
+    if any(part.stuff == "horn" for part in figure.parts):
+        worn["horn"] = stage.wear(rng, horn, 0.2 * half_m, depth_m, size=128)
+    return worn
+
+
+def _jungle(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
+    """Winding trees and palms, vines from above the image, a wall of leaves behind."""
+    garden = Garden(plan.stage, plan.depth_m)
+    kinds = [Palm.sample(rng) if chance(rng, 0.35) else _old_tree(rng) for _ in range(4)]
+    trees(rng, garden, kinds, integer(rng, *config.trees), (1.7, 9.0), (0.7, 1.6), [leaves()] * 3)
+    _thicket(rng, garden, integer(rng, 18, 30), (4.0, 11.0), 1.2)
+    _vines(rng, plan, integer(rng, 4, 10))
+
+
+def _meadow(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
+    """A few trees, toadstools in the grass, bushes far back."""
+    garden = Garden(plan.stage, plan.depth_m)
+    kinds = [Palm.sample(rng) if chance(rng, 0.2) else _old_tree(rng) for _ in range(3)]
+    count = max(2, integer(rng, *config.trees) // 2)
+    trees(rng, garden, kinds, count, (2.5, 12.0), (0.7, 1.6), [leaves()] * 2)
+    _thicket(rng, garden, integer(rng, 8, 16), (5.0, 13.0), 0.8)
+    mushrooms(rng, garden, "toadstool", integer(rng, 4, 12), (0.8, 4.0), (0.08, 0.25), 0.0)
+
+
+def _grove(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
+    """Mushrooms as large as trees, small ones between them."""
+    garden = Garden(plan.stage, plan.depth_m)
+    glow = uniform(rng, 0.1, 0.6) if chance(rng, 0.3) else 0.0
+    mushrooms(rng, garden, "giant", integer(rng, *config.trees), (1.6, 9.0), (0.5, 2.2), glow)
+    mushrooms(rng, garden, "toadstool", integer(rng, 12, 26), (0.8, 4.0), (0.06, 0.4), glow)
+    _thicket(rng, garden, integer(rng, 10, 18), (5.0, 12.0), 0.9)
+
+
+def _cave_inside(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
+    """Dripstones from floor and roof, glowing mushrooms."""
+    stage, d = plan.stage, plan.depth_m
+    stone = stage.wear(rng, rock(), 0.4 * d, 1.5 * d)
+    shapes = [Dripstone.sample(rng) for _ in range(4)]
+    for index in range(2 * integer(rng, *config.trees)):
+        spot = stage.scatter(rng, (0.8 * d, 4.5 * d), 1.1)
+        shape, scale_m = choose(rng, shapes), log_uniform(rng, 0.15, 0.8) * d
+        if index % 2:
+            stage.stand(f"stalagmite {index}", shape, stone, spot, scale_m, sunk_m=0.05 * scale_m)
+        else:
+            stage.hang(f"stalactite {index}", shape, stone, spot, 1.3 * _CAVE_RADIUS * d, scale_m)
+    garden = Garden(stage, d)
+    mushrooms(rng, garden, "toadstool", integer(rng, 6, 16), (0.8, 4.0), (0.08, 0.35), uniform(rng, 0.3, 2.0))
+
+
+_FURNISH = {"jungle": _jungle, "meadow": _meadow, "mushrooms": _grove, "cave": _cave_inside}
+
+_CAVE_RADIUS = 1.35
+"""Of the tunnel at the camera, in focus distances."""
+
+
+@dataclass(frozen=True)
+class _Tunnel:
+    """Where the cave's room is."""
+
+    radius_m: float
+    end_m: float
+    """y of its far mouth."""
+    bend_m: float
+
+    def holds(self, spot: Spot) -> bool:
+        """Whether a spot is well inside, or well out in the open."""
+        x, y, _ = spot.ground_m
+        if y > self.end_m + self.radius_m:
+            return True
+        share = y / self.end_m
+        return bool(abs(x - self.bend_m * share * abs(share)) < 0.6 * self.radius_m and y < self.end_m)
+
+
+def _cave(rng: np.random.Generator, plan: _Plan) -> _Tunnel:
+    d, stage = plan.depth_m, plan.stage
+    radius_m, start_m = _CAVE_RADIUS * d, -1.5 * d
+    shape = Cavern(
+        length=uniform(rng, 4.0, 7.0),
+        bend=uniform(rng, -1.6, 1.6),
+        narrowing=uniform(rng, 0.75, 1.0),
+        roughness=uniform(rng, 0.08, 0.17),
+        wall=uniform(rng, 0.5, 0.9),
+        rings=64,
+        seed=new_seed(rng),
+    )
+    stone = stage.wear(rng, rock(ROCK, choose(rng, (MOSS, EARTH))), 3.0 * radius_m, 1.6 * d, size=512)
+    spot = Spot(np.array((0.0, start_m, 0.0)), 1.6 * d)
+    stage.stand("cave", shape, stone, spot, radius_m, sunk_m=-0.3 * radius_m, checked=False)
+    return _Tunnel(radius_m, start_m + shape.length * radius_m, shape.bend * radius_m)
+
+
+def _old_tree(rng: np.random.Generator) -> Tree:
+    return Tree(
+        height=uniform(rng, 1.2, 3.0),
+        thickness=uniform(rng, 0.12, 0.26),
+        boughs=integer(rng, 6, 10),
+        crooked=uniform(rng, 0.05, 0.15),
+        roots=integer(rng, 4, 8),
+        leaves=integer(rng, 280, 520),
+        leaf_size=uniform(rng, 0.18, 0.3),
+        seed=new_seed(rng),
+    )
+
+
+def _thicket(rng: np.random.Generator, garden: Garden, count: int, depths: Range, scale: float) -> None:
+    """Bushes far back, dense enough to close the view."""
+    kinds = [Bush.sample(rng) for _ in range(3)]
+    scales = (0.5 * scale, 1.3 * scale)
+    plants(rng, garden, "bush", kinds, count, depths, scales, [leaves()] * 3, sway=(0.005, 0.02), sunk=0.2)
+
+
+def _vines(rng: np.random.Generator, plan: _Plan, count: int) -> None:
+    """Cords that come down from above the image."""
+    stage, d = plan.stage, plan.depth_m
+    shapes = [Vine.sample(rng) for _ in range(3)]
+    green = [stage.wear(rng, leaves(), 0.5 * d, 1.2 * d) for _ in range(2)]
+    for index in range(count):
+        spot = stage.scatter(rng, (0.8 * d, 2.5 * d), 1.0)
+        # The slope of the image's upper edge, with some margin for the camera's motion.
+        edge = -stage.pose[2, 2] + (stage.half_view[1] + 0.12) * stage.pose[2, 1]
+        top_m = stage.pose[2, 3] + edge * spot.depth_m - spot.ground_m[2]
+        scale_m = min(log_uniform(rng, 0.4, 1.2) * d, 0.8 * top_m)
+        shape = choose(rng, shapes)
+        sway = stage.swaying(rng, shape, uniform(rng, 0.02, 0.08))
+        if scale_m > 0:
+            stage.hang(f"vine {index}", shape, choose(rng, green), spot, top_m, scale_m, deformation=sway)
+
+
+def _lights(
+    rng: np.random.Generator, config: MonkaaConfig, plan: _Plan, cave: _Tunnel | None
+) -> tuple[Light, ...]:
+    """A sun, and coloured lamps about the creature; in a cave the lamps hang under its roof."""
+    stage, d = plan.stage, plan.depth_m
+    target = stage.spot(0.0, d).ground_m + np.array((0.0, 0.0, 0.5 * plan.size_m))
+    lights: list[Light] = [sample_sun(rng, stage.pose)]
+    for index in range(integer(rng, *config.lamps) + (1 if cave else 0)):
+        if cave is None:
+            lights.append(sample_area_light(rng, stage.pose, target, d))
+        else:
+            lights.append(_cave_lamp(rng, plan, cave, index))
+    return tuple(lights)
+
+
+def _cave_lamp(rng: np.random.Generator, plan: _Plan, cave: _Tunnel, index: int) -> AreaLight:
+    """One near the camera first, the others further in."""
+    d = plan.depth_m
+    along = uniform(rng, -0.2, 0.6) * d if index == 0 else uniform(rng, 0.5, 0.9) * cave.end_m
+    share = along / cave.end_m
+    position = np.array(
+        (
+            cave.bend_m * share * abs(share) + uniform(rng, -0.35, 0.35) * cave.radius_m,
+            along,
+            uniform(rng, 0.4, 0.7) * cave.radius_m,
+        )
+    )
+    target = np.array((cave.bend_m * share * share, along + d, 0.0))
+    return AreaLight(
+        position_m=vector(position),
+        target_m=vector(target),
+        color=sample_light_color(rng, 0.8),
+        power_w=log_uniform(rng, 2.0, 8.0) * math.pi * d * d,
+        size_m=d * uniform(rng, 0.2, 0.5),
+    )
+
+
+FAMILY = Family(name="monkaa", config=MonkaaConfig, sample=sample_monkaa)

@@ -1,0 +1,423 @@
+"""Figures in wide landscapes: the world of MPI Sintel (Butler et al. 2012), with figures of our own.
+
+Robed or booted people, now and then with a beast, in mountains, snow, desert, a bamboo forest, a small
+town or among ruins; eroded land up to the horizon; fog, motion blur and defocus in the final pass. Lengths
+are metres, a person being about 1.75 m tall; the distance follows from how large the person is to appear.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from scenes.drawing import Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.family import Family
+from scenes.figures import Coat, Figure, sample_creature, sample_person, statue
+from scenes.lights import sample_area_light, sample_sun
+from scenes.outdoors import (
+    Count,
+    Land,
+    LandscapeConfig,
+    half_height,
+    linear,
+    sample_camera,
+    sample_final,
+    sample_focus,
+)
+from scenes.planting import Garden, boulders, grass, plants, trees, undergrowth
+from scenes.shapes.landforms import Landscape
+from scenes.shapes.masonry import Archway, BlockWall, Column, House, Steps
+from scenes.shapes.plants import Bamboo, Conifer, Palm, Tree
+from scenes.spec import Light, Scene, World
+from scenes.stage import Spot, Stage
+from scenes.stuffs import (
+    BY_NAME,
+    DESERT_ROCK,
+    SNOWY,
+    Stuff,
+    culm,
+    grains,
+    ground,
+    leaves,
+    masonry,
+    paving,
+    plaster,
+    rock,
+    roofing,
+)
+from scenes.textures.sky import Sky
+from scenes.tones import DRY_GRASS, EARTH, FOLIAGE, MOSS, RED_ROCK, ROCK, SAND, SNOW
+
+PERSON_M = 1.75
+
+
+@dataclass(frozen=True)
+class SintelConfig(LandscapeConfig):
+    """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+
+    focal_mm: Range = (26.0, 60.0)
+    """Focal length on a sensor 32 mm wide."""
+    focus_disparity_share: Range = (0.01, 0.036)
+    """Disparity of the person the scene is about, as a share of the image width (0.01 is 10 px at 960);
+    it sets the baseline."""
+    focus_height_share: Range = (0.35, 0.8)
+    """Height of that person, as a share of the image height."""
+    fog_share: float = 0.6
+    """Share of the scenes with fog in the final pass, 0..1."""
+    people: Count = (1, 4)
+    """People per scene; the first is what the scene is about."""
+    beast_share: float = 0.3
+    """Share of the scenes with an animal beside the people, 0..1."""
+    trees: Count = (14, 30)
+    """Trees or bamboo clumps per scene, where the place has them."""
+    structures: Count = (6, 12)
+    """Columns, arches, walls and steps per scene, where the place has them; houses in towns."""
+    boulders: Count = (10, 30)
+    """Rocks per scene."""
+    plants: Count = (15, 40)
+    """Low plants per scene, where the place has them; as many tufts of grass."""
+    lamps: Count = (0, 1)
+    """Soft lamps per scene beside sun and sky."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A kind of landscape."""
+
+    share: float
+    """How many of all scenes are such, relative to the others."""
+    floor: Stuff
+    stones: Stuff
+    relief: Range
+    """Height of the outermost hills, relative to half the land's side."""
+    ridged: Range
+    """0 rounded hills .. 1 sharp crests."""
+    clearing: Range
+    """Radius of the level middle, relative to half the land's side."""
+    furnish: Callable[[np.random.Generator, SintelConfig, _Plan], None]
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What is decided before anything is placed."""
+
+    name: str
+    place: _Place
+    depth_m: float
+    """Of the person the scene is about."""
+    stage: Stage
+
+    @property
+    def garden(self) -> Garden:
+        return Garden(self.stage, self.depth_m)
+
+
+def sample_sintel(rng: np.random.Generator, config: SintelConfig) -> Scene:
+    """Draw one scene."""
+    plan = _sample_plan(rng, config)
+    stage, depth_m = plan.stage, plan.depth_m
+    sky = Sky.sample(rng, 1024)
+    stage.ground(rng, plan.place.floor, 1.5 * depth_m)
+    people = _people(rng, config, plan)
+    plan.place.furnish(rng, config, plan)
+    stones = (plan.place.stones, plan.place.stones)
+    boulders(rng, plan.garden, "rock", integer(rng, *config.boulders), stones, (0.7, 9.0), (0.03, 0.3))
+    boulders(rng, plan.garden, "crag", integer(rng, 3, 8), stones, (5.0, 25.0), (0.5, 2.0))
+    base = Scene(
+        family="sintel",
+        frames=config.frames,
+        camera=stage.camera,
+        objects=(),
+        materials=(),
+        lights=_lights(rng, config, plan),
+        world=World(sky, uniform(rng, *config.sky_strength)),
+        exposure_key=uniform(rng, 0.18, 0.32),
+        final=sample_final(
+            rng, depth_m, linear(sky.horizon), config.fog_share, (2.5 * depth_m, 40 * depth_m)
+        ),
+        notes={"people": float(people), "place": float(sorted(_PLACES).index(plan.name))},
+    )
+    return stage.scene(base)
+
+
+def _sample_plan(rng: np.random.Generator, config: SintelConfig) -> _Plan:
+    names = sorted(_PLACES)
+    name = choose(rng, names, [_PLACES[key].share for key in names])
+    place, focal_mm = _PLACES[name], uniform(rng, *config.focal_mm)
+    depth_m = PERSON_M / (2 * half_height(focal_mm, config) * uniform(rng, *config.focus_height_share))
+    land = _sample_land(rng, place, depth_m)
+    focus = sample_focus(rng, config, focal_mm, depth_m, PERSON_M, uniform(rng, 0.5, 1.3) * PERSON_M)
+    camera = sample_camera(rng, config.width, config.height, config.frames, land, focus)
+    return _Plan(name, place, depth_m, Stage(land, camera, config.frames, 1.15 * focus.nearest_m))
+
+
+def _sample_land(rng: np.random.Generator, place: _Place, depth_m: float) -> Land:
+    shape = Landscape(
+        relief=uniform(rng, *place.relief),
+        roll=uniform(rng, 0.0005, 0.002),
+        clearing=uniform(rng, *place.clearing),
+        frequency=uniform(rng, 3.0, 9.0),
+        octaves=7,
+        ridged=uniform(rng, *place.ridged),
+        cells=120,
+        concentration=2.4,
+        seed=new_seed(rng),
+    )
+    return Land(shape, uniform(rng, 30.0, 60.0) * depth_m)
+
+
+def _people(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> int:
+    """The one the scene is about, others about it, sometimes a beast; returns how many people there are."""
+    stage, d = plan.stage, plan.depth_m
+    placed = 0
+    for index in range(integer(rng, *config.people)):
+        figure = sample_person(rng, 56 if index == 0 else 44)
+        scale_m = PERSON_M * uniform(rng, 0.92, 1.06)
+        right = uniform(rng, -0.45, 0.45)
+        # Mostly seen from the front or the side, now and then from behind.
+        heading = -math.pi / 2 + uniform(rng, -2.2, 2.2)
+        spot = stage.spot(right, d, heading)
+        if index > 0:
+            spot = stage.spot(uniform(rng, -0.9, 0.9), d * log_uniform(rng, 0.9, 3.5), heading)
+        placed += _dressed(rng, stage, f"person {index}", figure, spot, scale_m, checked=index > 0)
+        if index == 0:
+            stage.keep_free(right, 0.5 * scale_m / (d * stage.half_view[0]), d)
+    if chance(rng, config.beast_share):
+        figure = sample_creature(rng, Coat(integer(rng, 0, 1500), 0.03, 48))
+        spot = stage.spot(uniform(rng, -0.9, 0.9), d * log_uniform(rng, 1.0, 2.5), uniform(rng, 0.0, 6.3))
+        _dressed(rng, stage, "beast", figure, spot, uniform(rng, 0.8, 2.0), checked=True)
+    return placed
+
+
+def _dressed(
+    rng: np.random.Generator,
+    stage: Stage,
+    name: str,
+    figure: Figure,
+    spot: Spot,
+    scale_m: float,
+    *,
+    checked: bool,
+) -> bool:
+    """Put a figure on the stage in materials of its own."""
+    stuffs = {part.stuff for part in figure.parts}
+    worn = {
+        stuff: stage.wear(
+            rng,
+            BY_NAME[stuff],
+            (0.5 if stuff in ("cloth", "fur") else 0.2) * scale_m,
+            spot.depth_m,
+            size=256 if stuff in ("cloth", "fur") else 128,
+            gloss=0.5 if stuff == "eye" else 0.0,
+        )
+        for stuff in sorted(stuffs)
+    }
+    return stage.figure(name, figure, worn, spot, scale_m, checked=checked)
+
+
+def _mountain(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
+    garden = plan.garden
+    _conifers(rng, config, plan, [leaves()] * 2)
+    undergrowth(rng, garden, integer(rng, *config.plants) // 2, [leaves(), leaves(DRY_GRASS)], (0.04, 0.14))
+    grass(rng, garden, integer(rng, *config.plants), (FOLIAGE, DRY_GRASS), (0.04, 0.12))
+
+
+def _snow(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
+    _conifers(rng, config, plan, [leaves(), grains(SNOW)])
+    if chance(rng, 0.5):
+        _bare_trees(rng, plan, integer(rng, 3, 9))
+    if chance(rng, 0.3):
+        _ruined(rng, plan, integer(rng, *config.structures) // 2, masonry(ROCK))
+
+
+def _desert(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
+    garden = plan.garden
+    if chance(rng, 0.7):
+        _ruined(rng, plan, integer(rng, *config.structures) // 2, masonry(SAND))
+    if chance(rng, 0.6):
+        palms = [Palm.sample(rng) for _ in range(2)]
+        trees(rng, garden, palms, integer(rng, 3, 10), (1.5, 8.0), (0.25, 0.5), [leaves(DRY_GRASS), leaves()])
+    grass(rng, garden, integer(rng, *config.plants) // 2, (DRY_GRASS,), (0.04, 0.12))
+
+
+def _bamboo(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
+    garden = plan.garden
+    clumps = [
+        Bamboo(
+            integer(rng, 2, 4),
+            integer(rng, 8, 11),
+            uniform(rng, 0.006, 0.011),
+            uniform(rng, 0.05, 0.14),
+            5,
+            new_seed(rng),
+        )
+        for _ in range(4)
+    ]
+    count = 2 * integer(rng, *config.trees)
+    scales = (7.0 / plan.depth_m, 11.0 / plan.depth_m)
+    plants(
+        rng, garden, "bamboo", clumps, count, (0.9, 9.0), scales, [culm] * 3, sway=(0.005, 0.03), sunk=0.005
+    )
+    undergrowth(rng, garden, integer(rng, *config.plants), [leaves()] * 2, (0.04, 0.16))
+    grass(rng, garden, integer(rng, *config.plants) // 2, (FOLIAGE, DRY_GRASS), (0.03, 0.1))
+    if chance(rng, 0.5):
+        _ruined(rng, plan, 2, masonry(ROCK))
+
+
+def _ruins(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
+    garden, stone = plan.garden, masonry(choose(rng, (ROCK, SAND, RED_ROCK)))
+    _ruined(rng, plan, integer(rng, *config.structures), stone)
+    _colonnade(rng, plan, stone)
+    if chance(rng, 0.6):
+        _bare_trees(rng, plan, integer(rng, 2, 5))
+    undergrowth(rng, garden, integer(rng, *config.plants), [leaves(), leaves(MOSS)], (0.03, 0.13))
+    grass(rng, garden, integer(rng, *config.plants), (FOLIAGE, DRY_GRASS), (0.03, 0.1))
+
+
+def _town(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
+    """Houses along both sides of a street that leads away from the camera, a wall or tower at its end."""
+    stage, d = plan.stage, plan.depth_m
+    houses = [House.sample(rng) for _ in range(4)]
+    walls = [stage.wear(rng, plaster, 4.0, 2 * d, size=512) for _ in range(4)]
+    roofs = [stage.wear(rng, roofing, 3.0, 2 * d) for _ in range(3)]
+    half_street_m = uniform(rng, 2.2, 4.5)
+    for side in (-1, 1):
+        along_m = uniform(rng, 0.2, 0.8) * d
+        for index in range(integer(rng, *config.structures) // 2 + 2):
+            shape, width_m = choose(rng, houses), uniform(rng, 4.0, 6.5)
+            facing = choose(rng, (0.0, math.pi / 2 * side))
+            extent = (shape.length if facing == 0.0 else 1.0) * width_m
+            across = (1.0 if facing == 0.0 else shape.length) * width_m
+            centre = np.array(
+                (side * (half_street_m + across / 2 + uniform(rng, 0.0, 1.0)), along_m + extent / 2)
+            )
+            spot = _spot_at(stage, centre, facing + float(rng.normal(0.0, 0.06)))
+            worn = {"walls": choose(rng, walls), "roof": choose(rng, roofs)}
+            stage.stand_in_parts(f"house {side} {index}", shape, worn, spot, width_m, on_lowest=True)
+            along_m += extent * uniform(rng, 1.05, 1.5)
+    _ruined(rng, plan, integer(rng, 1, 4), masonry(choose(rng, (ROCK, SAND))), ruin=0.1)
+    if chance(rng, 0.6):
+        kinds = [replace(Tree.sample(rng), leaves=300)]
+        trees(rng, plan.garden, kinds, integer(rng, 2, 5), (1.3, 8.0), (0.2, 0.35), [leaves()])
+
+
+def _spot_at(stage: Stage, flat_m: np.ndarray, heading_rad: float) -> Spot:
+    height = float(stage.land.height_m(flat_m[None])[0])
+    place = np.array((*flat_m, height))
+    depth = float((stage.pose[:3, 3] - place) @ stage.pose[:3, 2])
+    return Spot(place, depth, heading_rad)
+
+
+def _conifers(rng: np.random.Generator, config: SintelConfig, plan: _Plan, foliage: Sequence[Stuff]) -> None:
+    kinds = [
+        replace(Conifer.sample(rng), whorls=integer(rng, 8, 11), branches=integer(rng, 5, 7))
+        for _ in range(3)
+    ]
+    # A scale of one is a tree of one metre's radius at the foot.
+    scales = (0.9 / plan.depth_m, 2.4 / plan.depth_m)
+    trees(rng, plan.garden, kinds, integer(rng, *config.trees), (1.4, 16.0), scales, foliage)
+
+
+def _bare_trees(rng: np.random.Generator, plan: _Plan, count: int) -> None:
+    kinds = [replace(Tree.sample(rng), leaves=0, crooked=uniform(rng, 0.1, 0.25)) for _ in range(3)]
+    scales = (1.2 / plan.depth_m, 3.0 / plan.depth_m)
+    trees(rng, plan.garden, kinds, count, (1.3, 8.0), scales, [leaves()])
+
+
+def _ruined(rng: np.random.Generator, plan: _Plan, count: int, stone: Stuff, ruin: float = 1.0) -> None:
+    """Walls, towers, arches, steps, columns and a statue, here and there; `ruin` scales their decay."""
+    stage, d = plan.stage, plan.depth_m
+    worn = [stage.wear(rng, stone, 2.0, 1.8 * d, size=512) for _ in range(2)]
+    for index in range(count):
+        kind = choose(rng, (BlockWall, Archway, Steps, Column, "statue"), (0.3, 0.25, 0.12, 0.2, 0.13))
+        spot = stage.scatter(rng, (1.1 * d, 7.0 * d), 1.1)
+        material = choose(rng, worn)
+        name = f"ruin {index}"
+        if kind is Archway:
+            shape = replace(Archway.sample(rng), seed=new_seed(rng))
+            shape = replace(shape, ruin=shape.ruin * ruin)
+            facing = replace(spot, heading_rad=float(rng.normal(0.0, 0.5)))
+            stage.stand(name, shape, material, facing, uniform(rng, 2.2, 4.5), on_lowest=True)
+        elif kind is BlockWall:
+            wall = BlockWall.sample(rng)
+            wall = replace(wall, ruin=wall.ruin * ruin)
+            stage.stand(name, wall, material, spot, uniform(rng, 0.45, 0.8), on_lowest=True)
+        elif kind is Steps:
+            stage.stand(name, Steps.sample(rng), material, spot, uniform(rng, 0.3, 0.45), on_lowest=True)
+        elif kind is Column:
+            _column(rng, stage, name, Column.sample(rng), material, spot)
+        else:
+            _statue(rng, stage, name, material, spot)
+
+
+def _column(
+    rng: np.random.Generator, stage: Stage, name: str, shape: Column, material: int, spot: Spot
+) -> None:
+    """Standing, or one time in four lying on the ground."""
+    scale_m = uniform(rng, 3.0, 6.5) / shape.slenderness
+    if chance(rng, 0.25):
+        fallen = Rotation.from_euler("X", 90.0, degrees=True)
+        stage.stand(name, shape, material, spot, scale_m, sunk_m=-0.6 * scale_m, lean=fallen)
+    else:
+        stage.stand(name, shape, material, spot, scale_m, on_lowest=True)
+
+
+def _statue(rng: np.random.Generator, stage: Stage, name: str, material: int, spot: Spot) -> None:
+    """A person of stone on a stepped plinth."""
+    scale_m = uniform(rng, 1.6, 3.2)
+    plinth = BlockWall(2, 3, 0.5, 2.6, 0.0, 0.0, 0.02, new_seed(rng))
+    facing = replace(spot, heading_rad=-math.pi / 2 + float(rng.normal(0.0, 0.6)))
+    block_m = 0.3 * scale_m
+    figure = statue(rng, sample_person(rng, 40))
+    body = replace(facing, ground_m=facing.ground_m + np.array((0.0, 0.0, 0.98 * block_m)))
+    upright = replace(facing, heading_rad=facing.heading_rad + math.pi / 2)
+    box = stage.box_of(figure, body, scale_m, 0.0, None)
+    if stage.allows(box) and stage.stand(f"{name} plinth", plinth, material, upright, block_m):
+        stage.stand(f"{name} statue", figure, material, body, scale_m, checked=False)
+
+
+def _colonnade(rng: np.random.Generator, plan: _Plan, stone: Stuff) -> None:
+    """Two rows of columns of one kind, some broken, that lead away from the camera or across the view."""
+    stage, d = plan.stage, plan.depth_m
+    material = stage.wear(rng, stone, 2.0, 1.5 * d)
+    whole = replace(Column.sample(rng), broken=0.0)
+    kinds = [whole, *(replace(whole, broken=uniform(rng, 0.2, 0.8), seed=new_seed(rng)) for _ in range(3))]
+    height_m, gap_m, row_m = uniform(rng, 3.5, 7.0), uniform(rng, 2.0, 3.5), uniform(rng, 2.5, 5.0)
+    turn = Rotation.from_euler("Z", float(rng.normal(0.0, 0.5))).as_matrix()[:2, :2]
+    origin = np.array((uniform(rng, -1.0, 1.0), uniform(rng, 0.9, 1.6) * d))
+    for index in range(integer(rng, 8, 16)):
+        flat = origin + turn @ np.array(((index % 2 - 0.5) * 2 * row_m, index // 2 * gap_m))
+        spot = _spot_at(stage, flat, 0.0)
+        stage.stand(
+            f"column {index}",
+            choose(rng, kinds),
+            material,
+            spot,
+            height_m / whole.slenderness,
+            on_lowest=True,
+        )
+
+
+def _lights(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> tuple[Light, ...]:
+    """One sun, often low; sometimes a lamp that fills the shadows of the people."""
+    stage, d = plan.stage, plan.depth_m
+    target = stage.spot(0.0, d).ground_m + np.array((0.0, 0.0, 0.5 * PERSON_M))
+    lights: list[Light] = [sample_sun(rng, stage.pose)]
+    lights += [sample_area_light(rng, stage.pose, target, d) for _ in range(integer(rng, *config.lamps))]
+    return tuple(lights)
+
+
+_PLACES: dict[str, _Place] = {
+    "mountain": _Place(0.2, ground(FOLIAGE), rock(), (0.35, 0.7), (0.6, 1.0), (0.08, 0.16), _mountain),
+    "snow": _Place(0.17, grains(SNOW), SNOWY, (0.3, 0.65), (0.5, 1.0), (0.08, 0.2), _snow),
+    "desert": _Place(0.15, grains(SAND), DESERT_ROCK, (0.06, 0.3), (0.1, 0.6), (0.08, 0.2), _desert),
+    "bamboo": _Place(0.14, ground(DRY_GRASS), rock(), (0.15, 0.4), (0.2, 0.7), (0.1, 0.2), _bamboo),
+    "ruins": _Place(0.18, ground(MOSS), rock(), (0.2, 0.5), (0.3, 0.9), (0.15, 0.3), _ruins),
+    "town": _Place(0.16, paving, rock(ROCK, EARTH), (0.2, 0.5), (0.4, 0.9), (0.3, 0.45), _town),
+}
+
+FAMILY = Family(name="sintel", config=SintelConfig, sample=sample_sintel)
