@@ -374,6 +374,10 @@ def _figure(
     )
 
 
+_HEM = 0.045
+"""Height of a robe's hem over the ground."""
+
+
 def sample_person(rng: np.random.Generator, cells: int) -> Figure:
     """A human figure of height 1: in a robe, or in tunic, trousers and boots; some with a staff or a hood."""
     body, gait = _Body(), _sample_gait(rng)
@@ -390,8 +394,7 @@ def sample_person(rng: np.random.Generator, cells: int) -> Figure:
     )
     feet = [_person_leg(body, gait, root, side, phase, robed) for side, phase in ((1.0, 0.0), (-1.0, 0.5))]
     if robed:
-        hem = uniform(rng, 0.14, 0.21)
-        body.flesh("cloth", (0.0, 0.0, 0.52), (-0.01, 0.0, 0.03 + hem * 0.9), 0.9 * girth, hem)
+        body.flesh("cloth", (0.0, 0.0, 0.52), (-0.01, 0.0, _HEM), 0.9 * girth, uniform(rng, 0.13, 0.2))
     hands = [_person_arm(rng, body, gait, root, side, girth) for side in (1.0, -1.0)]
     head = body.bone(
         "skin",
@@ -483,6 +486,7 @@ def _dressed(
             comb=(0.0, 0.0, 0.0),
             cells=round(cells * share),
             seed=new_seed(rng),
+            floor=_HEM if group == "cloth" else None,
         )
         parts.append(FigurePart(shape, "cloth" if group == "legs" else group))
     eyes = Eyeballs(((0.058, -0.024, 0.935), (0.058, 0.024, 0.935)), (1.0, 0.0, 0.0), 0.013)
@@ -499,4 +503,4 @@ def _dressed(
 def statue(rng: np.random.Generator, figure: Figure) -> SoftBody:
     """All of a figure's flesh as one body, to be hewn from stone."""
     limbs = [limb for part in figure.parts if isinstance(part.shape, SoftBody) for limb in part.shape.limbs]
-    return SoftBody(tuple(limbs), 0.006, 0.003, 0, 0.0, (0.0, 0.0, 0.0), 60, new_seed(rng))
+    return SoftBody(tuple(limbs), 0.006, 0.003, 0, 0.0, (0.0, 0.0, 0.0), 60, new_seed(rng), 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from scenes.drawing import Range, chance, log_uniform, uniform
 from scenes.family import FamilyConfig
-from scenes.motion import exposure_times, shifted, vector, wander
+from scenes.motion import KEY_SPACING_FRAMES, exposure_times, vector, wander
 from scenes.shapes.landforms import Landscape
 from scenes.spec import Color, FinalPass, Fog, StereoCamera
 
@@ -103,7 +103,8 @@ class Focus:
     disparity_share: float
     """Its disparity as a share of the image width."""
     eye_height_m: float
-    pitch_deg: float
+    above_deg: float
+    """How far above its middle the camera looks."""
     focal_mm: float
     speed_m: float
     """Of the camera, a frame."""
@@ -119,29 +120,31 @@ class Focus:
 def sample_camera(
     rng: np.random.Generator, width: int, height: int, frames: int, land: Land, focus: Focus
 ) -> StereoCamera:
-    """A rig that looks along +y, its baseline such that the focus has its disparity, on a smooth path.
+    """A rig over the origin that looks along +y at the middle of the focus, on a smooth path.
 
-    The path is lifted as a whole where it would come too near the ground.
+    Its baseline is such that the focus has its disparity; none of its path comes near the ground.
     """
-    attitude = Rotation.from_euler("XZ", (90.0 - focus.pitch_deg, uniform(rng, -2.0, 2.0)), degrees=True)
     focal_px = focus.focal_mm / 32.0 * width
     baseline_m = focus.disparity_share * width * focus.depth_m / focal_px
-    start = np.array((-baseline_m / 2, 0.0, focus.eye_height_m))
+    reach_m = min(focus.speed_m * KEY_SPACING_FRAMES / 2, 0.12 * focus.depth_m)
+    angle = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle)], -1)
+    around = np.concatenate([circle * share for share in (0.0, 0.5, 1.0)]) * (reach_m + baseline_m)
+    above_m = max(focus.eye_height_m, reach_m + 0.4 * focus.eye_height_m)
+    eye_m = float(land.height_m(around).max()) + above_m
+    target_m = float(land.height_m(np.array([[0.0, focus.depth_m]]))[0]) + 0.5 * focus.size_m
+    pitch_deg = math.degrees(math.atan2(eye_m - target_m, focus.depth_m)) - focus.above_deg
     motion = wander(
         rng,
         frames,
-        start,
-        attitude,
+        np.array((-baseline_m / 2, 0.0, eye_m)),
+        Rotation.from_euler("XZ", (90.0 - pitch_deg, uniform(rng, -2.0, 2.0)), degrees=True),
         speed_m=focus.speed_m,
         turn_deg=focus.turn_deg,
-        reach_m=0.12 * focus.depth_m,
+        reach_m=reach_m,
         reach_deg=3.0,
     )
-    still = StereoCamera(width, height, focus.focal_mm, baseline_m, motion)
-    eyes = eye_positions(still, frames)
-    needed = land.height_m(eyes[:, :2]) + 0.6 * focus.eye_height_m - eyes[:, 2]
-    lift = max(0.0, float(needed.max()))
-    return replace(still, motion=shifted(motion, np.array((0.0, 0.0, lift))))
+    return StereoCamera(width, height, focus.focal_mm, baseline_m, motion)
 
 
 def eye_positions(camera: StereoCamera, frames: int) -> NDArray[np.float64]:
@@ -171,13 +174,12 @@ def sample_focus(
     share = uniform(rng, *config.focus_disparity_share)
     half_high = half_height(focal_mm, config)
     height_m = max(eye_height_m, 1.3 * (half_high + 0.1) * depth_m * share / NEAREST_SHARE)
-    pitch = math.degrees(math.atan2(height_m - 0.5 * size_m, depth_m)) + uniform(rng, -5.5, 1.5)
     return Focus(
         depth_m=depth_m,
         size_m=size_m,
         disparity_share=share,
         eye_height_m=height_m,
-        pitch_deg=pitch,
+        above_deg=uniform(rng, -0.05, 0.3) * math.degrees(half_high),
         focal_mm=focal_mm,
         speed_m=uniform(rng, *config.camera_speed) * depth_m,
         turn_deg=uniform(rng, *config.camera_turn_deg),

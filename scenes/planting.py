@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from scenes.stage import Spot, Stage
 from scenes.standing import Standing
 from scenes.stuffs import Stuff, bark, cap, horn, leaves
 from scenes.tones import FOLIAGE, Tones
+
+T = TypeVar("T")
 
 Holds = Callable[[Spot], bool]
 
@@ -46,6 +49,17 @@ class Garden:
         return [spot for spot in drawn if self.holds(spot)]
 
 
+STILL_BEYOND = 2.2
+"""Plants farther away than this many units do not sway: too little to see, and they can share their meshes."""
+
+
+def _outfits(rng: np.random.Generator, kinds: Sequence[T], materials: Sequence[int]) -> list[tuple[T, int]]:
+    """Each kind and each material at least once, in few pairs: things alike in both are one mesh."""
+    count = max(len(kinds), len(materials)) + 2
+    order = rng.permutation(count)
+    return [(kinds[k % len(kinds)], materials[int(order[k]) % len(materials)]) for k in range(count)]
+
+
 def trees(
     rng: np.random.Generator,
     garden: Garden,
@@ -61,11 +75,11 @@ def trees(
     seen_m = 1.6 * depths[0] * unit_m
     wood = [stage.wear(rng, trunk, unit_m, seen_m) for _ in range(2)]
     green = [stage.wear(rng, stuff, unit_m, seen_m) for stuff in foliage]
+    outfits = [(kind, leaf, choose(rng, wood)) for kind, leaf in _outfits(rng, kinds, green)]
     for index, spot in enumerate(garden.spots(rng, count, depths, 1.2)):
-        worn = {"wood": choose(rng, wood), "leaves": choose(rng, green)}
-        stage.stand_in_parts(
-            f"tree {index}", choose(rng, kinds), worn, spot, log_uniform(rng, *scales) * unit_m
-        )
+        kind, leaf, stem = choose(rng, outfits)
+        worn = {"wood": stem, "leaves": leaf}
+        stage.stand_in_parts(f"tree {index}", kind, worn, spot, log_uniform(rng, *scales) * unit_m)
 
 
 def plants(
@@ -86,17 +100,13 @@ def plants(
     stage, unit_m = garden.stage, garden.unit_m
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
     green = [stage.wear(rng, stuff, middle_m, 1.4 * depths[0] * unit_m) for stuff in foliage]
+    outfits = _outfits(rng, kinds, green)
     for index, spot in enumerate(garden.spots(rng, count, depths, spread)):
-        shape, scale_m = choose(rng, kinds), log_uniform(rng, *scales) * unit_m
-        motion = stage.swaying(rng, shape, uniform(rng, *sway))
+        (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
+        moves = spot.depth_m < STILL_BEYOND * unit_m
+        motion = stage.swaying(rng, shape, uniform(rng, *sway)) if moves else None
         stage.stand(
-            f"{name} {index}",
-            shape,
-            choose(rng, green),
-            spot,
-            scale_m,
-            sunk_m=sunk * scale_m,
-            deformation=motion,
+            f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk * scale_m, deformation=motion
         )
 
 
@@ -146,11 +156,11 @@ def mushrooms(
     middle_m, seen_m = math.sqrt(scales[0] * scales[1]) * unit_m, 1.5 * depths[0] * unit_m
     pale = stage.wear(rng, horn, middle_m, seen_m)
     caps = [stage.wear(rng, cap, middle_m, seen_m, emission=glow) for _ in range(3)]
+    outfits = _outfits(rng, kinds, caps)
     for index, spot in enumerate(garden.spots(rng, count, depths, 1.1)):
-        worn = {"stem": pale, "cap": choose(rng, caps)}
-        stage.stand_in_parts(
-            f"{name} {index}", choose(rng, kinds), worn, spot, log_uniform(rng, *scales) * unit_m
-        )
+        kind, top = choose(rng, outfits)
+        worn = {"stem": pale, "cap": top}
+        stage.stand_in_parts(f"{name} {index}", kind, worn, spot, log_uniform(rng, *scales) * unit_m)
 
 
 def boulders(
@@ -167,13 +177,8 @@ def boulders(
     kinds = [replace(Boulder.sample(rng), detail=3) for _ in range(4)]
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
     worn = [stage.wear(rng, stuff, middle_m, 1.8 * depths[0] * unit_m) for stuff in stones]
+    outfits = _outfits(rng, kinds, worn)
     for index, spot in enumerate(garden.spots(rng, count, depths, 1.15)):
-        scale_m = log_uniform(rng, *scales) * unit_m
-        stage.stand(
-            f"{name} {index}",
-            choose(rng, kinds),
-            choose(rng, worn),
-            spot,
-            scale_m,
-            sunk_m=scale_m * uniform(rng, 0.2, 0.6),
-        )
+        (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
+        sunk_m = scale_m * uniform(rng, 0.2, 0.6)
+        stage.stand(f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk_m)

@@ -121,8 +121,8 @@ def _sample_plan(rng: np.random.Generator, config: MonkaaConfig) -> _Plan:
 def _sample_land(rng: np.random.Generator, place: str, depth_m: float) -> Land:
     steep = place in ("jungle", "cave")
     shape = Landscape(
-        relief=uniform(rng, 0.25, 0.5) if steep else uniform(rng, 0.05, 0.3),
-        roll=uniform(rng, 0.001, 0.006),
+        relief=uniform(rng, 0.12, 0.4) if steep else uniform(rng, 0.02, 0.22),
+        roll=uniform(rng, 0.0005, 0.002),
         clearing=uniform(rng, 0.12, 0.3),
         frequency=uniform(rng, 3.0, 8.0),
         octaves=6,

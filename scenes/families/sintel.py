@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.drawing import Range, chance, choose, integer, log_uniform, new_seed, uniform
@@ -50,7 +51,7 @@ from scenes.stuffs import (
     roofing,
 )
 from scenes.textures.sky import Sky
-from scenes.tones import DRY_GRASS, EARTH, FOLIAGE, MOSS, RED_ROCK, ROCK, SAND, SNOW
+from scenes.tones import DRY_GRASS, EARTH, HEATH, MOSS, RED_ROCK, ROCK, SAND, SNOW
 
 PERSON_M = 1.75
 
@@ -125,8 +126,8 @@ def sample_sintel(rng: np.random.Generator, config: SintelConfig) -> Scene:
     people = _people(rng, config, plan)
     plan.place.furnish(rng, config, plan)
     stones = (plan.place.stones, plan.place.stones)
-    boulders(rng, plan.garden, "rock", integer(rng, *config.boulders), stones, (0.7, 9.0), (0.03, 0.3))
-    boulders(rng, plan.garden, "crag", integer(rng, 3, 8), stones, (5.0, 25.0), (0.5, 2.0))
+    boulders(rng, plan.garden, "rock", integer(rng, *config.boulders), stones, (0.7, 9.0), (0.03, 0.22))
+    boulders(rng, plan.garden, "crag", integer(rng, 3, 8), stones, (8.0, 30.0), (0.4, 1.6))
     base = Scene(
         family="sintel",
         frames=config.frames,
@@ -158,7 +159,7 @@ def _sample_plan(rng: np.random.Generator, config: SintelConfig) -> _Plan:
 def _sample_land(rng: np.random.Generator, place: _Place, depth_m: float) -> Land:
     shape = Landscape(
         relief=uniform(rng, *place.relief),
-        roll=uniform(rng, 0.0005, 0.002),
+        roll=uniform(rng, 0.0001, 0.0006),
         clearing=uniform(rng, *place.clearing),
         frequency=uniform(rng, 3.0, 9.0),
         octaves=7,
@@ -221,13 +222,15 @@ def _dressed(
 
 def _mountain(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
     garden = plan.garden
-    _conifers(rng, config, plan, [leaves()] * 2)
-    undergrowth(rng, garden, integer(rng, *config.plants) // 2, [leaves(), leaves(DRY_GRASS)], (0.04, 0.14))
-    grass(rng, garden, integer(rng, *config.plants), (FOLIAGE, DRY_GRASS), (0.04, 0.12))
+    _conifers(rng, config, plan, [leaves(HEATH)] * 2)
+    undergrowth(
+        rng, garden, integer(rng, *config.plants) // 2, [leaves(HEATH), leaves(DRY_GRASS)], (0.04, 0.14)
+    )
+    grass(rng, garden, integer(rng, *config.plants), (HEATH, DRY_GRASS), (0.04, 0.12))
 
 
 def _snow(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
-    _conifers(rng, config, plan, [leaves(), grains(SNOW)])
+    _conifers(rng, config, plan, [leaves(HEATH), grains(SNOW)])
     if chance(rng, 0.5):
         _bare_trees(rng, plan, integer(rng, 3, 9))
     if chance(rng, 0.3):
@@ -240,7 +243,15 @@ def _desert(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None
         _ruined(rng, plan, integer(rng, *config.structures) // 2, masonry(SAND))
     if chance(rng, 0.6):
         palms = [Palm.sample(rng) for _ in range(2)]
-        trees(rng, garden, palms, integer(rng, 3, 10), (1.5, 8.0), (0.25, 0.5), [leaves(DRY_GRASS), leaves()])
+        trees(
+            rng,
+            garden,
+            palms,
+            integer(rng, 3, 10),
+            (1.5, 8.0),
+            (0.25, 0.5),
+            [leaves(DRY_GRASS), leaves(HEATH)],
+        )
     grass(rng, garden, integer(rng, *config.plants) // 2, (DRY_GRASS,), (0.04, 0.12))
 
 
@@ -262,20 +273,21 @@ def _bamboo(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None
     plants(
         rng, garden, "bamboo", clumps, count, (0.9, 9.0), scales, [culm] * 3, sway=(0.005, 0.03), sunk=0.005
     )
-    undergrowth(rng, garden, integer(rng, *config.plants), [leaves()] * 2, (0.04, 0.16))
-    grass(rng, garden, integer(rng, *config.plants) // 2, (FOLIAGE, DRY_GRASS), (0.03, 0.1))
+    undergrowth(rng, garden, integer(rng, *config.plants), [leaves(HEATH)] * 2, (0.04, 0.16))
+    grass(rng, garden, integer(rng, *config.plants) // 2, (HEATH, DRY_GRASS), (0.03, 0.1))
     if chance(rng, 0.5):
         _ruined(rng, plan, 2, masonry(ROCK))
 
 
 def _ruins(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
-    garden, stone = plan.garden, masonry(choose(rng, (ROCK, SAND, RED_ROCK)))
+    garden, tones = plan.garden, choose(rng, (ROCK, SAND, RED_ROCK))
+    stone, stones = masonry(tones), rock(tones)
     _ruined(rng, plan, integer(rng, *config.structures), stone)
-    _colonnade(rng, plan, stone)
+    _colonnade(rng, plan, stones)
     if chance(rng, 0.6):
         _bare_trees(rng, plan, integer(rng, 2, 5))
-    undergrowth(rng, garden, integer(rng, *config.plants), [leaves(), leaves(MOSS)], (0.03, 0.13))
-    grass(rng, garden, integer(rng, *config.plants), (FOLIAGE, DRY_GRASS), (0.03, 0.1))
+    undergrowth(rng, garden, integer(rng, *config.plants), [leaves(HEATH), leaves(MOSS)], (0.03, 0.13))
+    grass(rng, garden, integer(rng, *config.plants), (HEATH, DRY_GRASS), (0.03, 0.1))
 
 
 def _town(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
@@ -302,10 +314,10 @@ def _town(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
     _ruined(rng, plan, integer(rng, 1, 4), masonry(choose(rng, (ROCK, SAND))), ruin=0.1)
     if chance(rng, 0.6):
         kinds = [replace(Tree.sample(rng), leaves=300)]
-        trees(rng, plan.garden, kinds, integer(rng, 2, 5), (1.3, 8.0), (0.2, 0.35), [leaves()])
+        trees(rng, plan.garden, kinds, integer(rng, 2, 5), (1.3, 8.0), (0.2, 0.35), [leaves(HEATH)])
 
 
-def _spot_at(stage: Stage, flat_m: np.ndarray, heading_rad: float) -> Spot:
+def _spot_at(stage: Stage, flat_m: NDArray[np.float64], heading_rad: float) -> Spot:
     height = float(stage.land.height_m(flat_m[None])[0])
     place = np.array((*flat_m, height))
     depth = float((stage.pose[:3, 3] - place) @ stage.pose[:3, 2])
@@ -325,13 +337,14 @@ def _conifers(rng: np.random.Generator, config: SintelConfig, plan: _Plan, folia
 def _bare_trees(rng: np.random.Generator, plan: _Plan, count: int) -> None:
     kinds = [replace(Tree.sample(rng), leaves=0, crooked=uniform(rng, 0.1, 0.25)) for _ in range(3)]
     scales = (1.2 / plan.depth_m, 3.0 / plan.depth_m)
-    trees(rng, plan.garden, kinds, count, (1.3, 8.0), scales, [leaves()])
+    trees(rng, plan.garden, kinds, count, (1.3, 8.0), scales, [leaves(HEATH)])
 
 
 def _ruined(rng: np.random.Generator, plan: _Plan, count: int, stone: Stuff, ruin: float = 1.0) -> None:
     """Walls, towers, arches, steps, columns and a statue, here and there; `ruin` scales their decay."""
     stage, d = plan.stage, plan.depth_m
     worn = [stage.wear(rng, stone, 2.0, 1.8 * d, size=512) for _ in range(2)]
+    hewn = stage.wear(rng, plan.place.stones, 1.5, 1.8 * d)
     for index in range(count):
         kind = choose(rng, (BlockWall, Archway, Steps, Column, "statue"), (0.3, 0.25, 0.12, 0.2, 0.13))
         spot = stage.scatter(rng, (1.1 * d, 7.0 * d), 1.1)
@@ -345,13 +358,13 @@ def _ruined(rng: np.random.Generator, plan: _Plan, count: int, stone: Stuff, rui
         elif kind is BlockWall:
             wall = BlockWall.sample(rng)
             wall = replace(wall, ruin=wall.ruin * ruin)
-            stage.stand(name, wall, material, spot, uniform(rng, 0.45, 0.8), on_lowest=True)
+            stage.stand(name, wall, hewn, spot, uniform(rng, 0.45, 0.8), on_lowest=True)
         elif kind is Steps:
             stage.stand(name, Steps.sample(rng), material, spot, uniform(rng, 0.3, 0.45), on_lowest=True)
         elif kind is Column:
-            _column(rng, stage, name, Column.sample(rng), material, spot)
+            _column(rng, stage, name, Column.sample(rng), hewn, spot)
         else:
-            _statue(rng, stage, name, material, spot)
+            _statue(rng, stage, name, hewn, spot)
 
 
 def _column(
@@ -412,12 +425,12 @@ def _lights(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> tupl
 
 
 _PLACES: dict[str, _Place] = {
-    "mountain": _Place(0.2, ground(FOLIAGE), rock(), (0.35, 0.7), (0.6, 1.0), (0.08, 0.16), _mountain),
-    "snow": _Place(0.17, grains(SNOW), SNOWY, (0.3, 0.65), (0.5, 1.0), (0.08, 0.2), _snow),
-    "desert": _Place(0.15, grains(SAND), DESERT_ROCK, (0.06, 0.3), (0.1, 0.6), (0.08, 0.2), _desert),
-    "bamboo": _Place(0.14, ground(DRY_GRASS), rock(), (0.15, 0.4), (0.2, 0.7), (0.1, 0.2), _bamboo),
-    "ruins": _Place(0.18, ground(MOSS), rock(), (0.2, 0.5), (0.3, 0.9), (0.15, 0.3), _ruins),
-    "town": _Place(0.16, paving, rock(ROCK, EARTH), (0.2, 0.5), (0.4, 0.9), (0.3, 0.45), _town),
+    "mountain": _Place(0.2, ground(HEATH), rock(), (0.1, 0.3), (0.5, 1.0), (0.08, 0.2), _mountain),
+    "snow": _Place(0.17, grains(SNOW), SNOWY, (0.08, 0.28), (0.4, 1.0), (0.08, 0.2), _snow),
+    "desert": _Place(0.15, grains(SAND), DESERT_ROCK, (0.02, 0.12), (0.0, 0.5), (0.05, 0.2), _desert),
+    "bamboo": _Place(0.14, ground(DRY_GRASS), rock(), (0.05, 0.25), (0.2, 0.7), (0.1, 0.2), _bamboo),
+    "ruins": _Place(0.18, ground(HEATH), rock(), (0.03, 0.2), (0.2, 0.9), (0.1, 0.3), _ruins),
+    "town": _Place(0.16, paving, rock(ROCK, EARTH), (0.05, 0.25), (0.3, 0.9), (0.2, 0.4), _town),
 }
 
 FAMILY = Family(name="sintel", config=SintelConfig, sample=sample_sintel)

@@ -44,6 +44,8 @@ class SoftBody(Standing):
     cells: int
     """Grid cells along the longest side: how finely the skin is meshed."""
     seed: int
+    floor: float | None = None
+    """Height at which the body is cut off level, as a robe is at its hem; None for none."""
 
     popularity: ClassVar[float] = 0.8
     smooth: ClassVar[bool] = True
@@ -91,6 +93,8 @@ class SoftBody(Standing):
         distance = blended_capsules(points, start, end, radii[:, 0], radii[:, 1], self.blend)
         if self.folds > 0:
             distance = distance + self._creases(points)
+        if self.floor is not None:
+            distance = np.maximum(distance, self.floor - points[:, 2])
         vertices, triangles = surface_net(distance.reshape([len(axis) for axis in axes]))
         return vertices * cell + [axis[0] for axis in axes], triangles
 
@@ -209,7 +213,7 @@ class Staff(Standing):
         rng = np.random.default_rng(self.seed)
         share = np.linspace(0.0, 1.0, 20)
         aside = np.stack([np.sin(np.outer(share, rng.uniform(2.0, 7.0, 2))), np.zeros((20, 2))], -1)
-        path = np.array(self.foot) + np.outer(share * self.length, (0.0, 0.0, 1.0))
+        path = np.array(self.foot) + share[:, None] * np.array((0.0, 0.0, self.length))
         path[:, :2] += self.crook * self.length * aside[..., 0] * rng.choice([-1.0, 1.0], 2)
         knob = 1.0 + 1.6 * np.exp(-(((share - 0.95) / 0.04) ** 2)) - 0.3 * (1 - share)
         vertices, triangles, _ = tube(path, self.radius * knob, 8)

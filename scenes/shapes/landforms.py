@@ -211,9 +211,9 @@ class Boulder(Shape):
     def sample(cls, rng: np.random.Generator) -> Self:
         return cls(
             radii=sample_proportions(rng, 0.5),
-            facets=integer(rng, 5, 16),
-            bite=uniform(rng, 0.15, 0.4),
-            roughness=uniform(rng, 0.01, 0.05),
+            facets=integer(rng, 6, 18),
+            bite=uniform(rng, 0.25, 0.6),
+            roughness=uniform(rng, 0.01, 0.06),
             detail=4,
             seed=new_seed(rng),
         )

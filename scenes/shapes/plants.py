@@ -35,9 +35,9 @@ def _winding_path(
 ) -> Vertices:
     """(points, 3) from start to end, straying sideways by about `wobble`, not at all at the start."""
     share = np.linspace(0.0, 1.0, points)
-    waves = sum(
-        np.outer(np.sin(np.pi * share * (k + 0.5)), rng.normal(0.0, 1.0 / (k + 1), 3)) for k in range(3)
-    )
+    waves = np.zeros((points, 3))
+    for k in range(3):
+        waves += np.outer(np.sin(np.pi * share * (k + 0.5)), rng.normal(0.0, 1.0 / (k + 1), 3))
     path: Vertices = start + np.outer(share, end - start) + wobble * waves * (1.0, 1.0, 0.3)
     return path
 
@@ -461,7 +461,7 @@ class Bamboo(Standing):
             start = np.array((*rng.normal(0.0, self.spread * 0.6, 2), 0.0))
             lean = np.array((*rng.normal(0.0, 0.09, 2), 1.0)) * height
             share = np.linspace(0.0, 1.0, 3 * self.nodes)
-            path = start + np.outer(share, lean)
+            path = np.array(start + share[:, None] * lean, np.float64)
             path[:, :2] += np.outer(share**3, rng.normal(0.0, 0.1, 2))
             ring = 1 + 0.3 * (np.arange(len(share)) % 3 == 1)
             parts.append(_stem(path, self.radius * ring * (1 - 0.75 * share), 7))
