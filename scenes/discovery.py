@@ -18,11 +18,16 @@ def modules_in(package: ModuleType) -> list[ModuleType]:
 
 
 def concrete_subclasses(package: ModuleType, base: type[T]) -> dict[str, type[T]]:
-    """Every instantiable subclass of `base` defined in the package's modules, by class name."""
+    """Every instantiable subclass of `base` defined in the package's modules, by class name.
+
+    Raises TypeError for two of one name: files say which kind a record is by name alone.
+    """
     found: dict[str, type[T]] = {}
     for module in modules_in(package):
         for name, member in inspect.getmembers(module, inspect.isclass):
             local = member.__module__ == module.__name__
             if local and issubclass(member, base) and not inspect.isabstract(member):
+                if name in found:
+                    raise TypeError(f"{found[name].__module__} and {module.__name__} both define {name}")
                 found[name] = member
     return found

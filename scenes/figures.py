@@ -329,7 +329,7 @@ def _head(rng: np.random.Generator, body: _Body, gait: _Gait, parent: int, neck:
     for side in (-1.0, 1.0):
         # The balls sit half in the skull.
         aside = 0.5 * skull
-        centre = (mx + 0.72 * skull, my + side * aside, mz + 0.38 * skull)
+        centre = (mx + 0.8 * skull, my + side * aside, mz + 0.42 * skull)
         body.flesh("eye", centre, centre, radius, radius)
     return head
 

@@ -12,7 +12,7 @@ from scenes.painting import Palette
 from scenes.spec import Texture
 from scenes.textures.cells import Cobblestones, VoronoiCells
 from scenes.textures.marks import DeadLeaves
-from scenes.textures.natural import Bark, Foliage, Hair, Iris, Litter, Strata
+from scenes.textures.natural import Hair, Iris, LeafVeins, Litter, RoughBark, Strata
 from scenes.textures.noise import FractalNoise, Labyrinth, WoodPlanks
 from scenes.textures.plain import Gradient
 from scenes.textures.tiles import Bricks, Dots, Stripes, Weave
@@ -44,7 +44,7 @@ def leaves(tones: Tones = FOLIAGE) -> Stuff:
     def draw(rng: np.random.Generator, size: int) -> Texture:
         palette = sample_tones(rng, tones, 4)
         if rng.random() < 0.6:
-            return Foliage.of(rng, size, palette[:3], palette[3])
+            return LeafVeins.of(rng, size, palette[:3], palette[3])
         return _noise(rng, size, palette)
 
     return draw
@@ -116,12 +116,12 @@ def roofing(rng: np.random.Generator, size: int) -> Texture:
 
 
 def bark(rng: np.random.Generator, size: int) -> Texture:
-    return Bark.of(rng, size, sample_tones(rng, BARK, 4), sample_tones(rng, MOSS, 2)[1])
+    return RoughBark.of(rng, size, sample_tones(rng, BARK, 4), sample_tones(rng, MOSS, 2)[1])
 
 
 def culm(rng: np.random.Generator, size: int) -> Texture:
     palette = sample_tones(rng, replace(FOLIAGE, hue_deg=(90.0, 130.0)), 4)
-    return Bark.of(rng, size, palette, sample_tones(rng, DRY_GRASS, 2)[1])
+    return RoughBark.of(rng, size, palette, sample_tones(rng, DRY_GRASS, 2)[1])
 
 
 def timber(rng: np.random.Generator, size: int) -> Texture:
@@ -186,7 +186,7 @@ def eye(rng: np.random.Generator, size: int) -> Texture:
 
 
 def horn(rng: np.random.Generator, size: int) -> Texture:
-    return Bark.of(rng, size, sample_tones(rng, PLASTER, 3), sample_tones(rng, EARTH, 1)[0])
+    return RoughBark.of(rng, size, sample_tones(rng, PLASTER, 3), sample_tones(rng, EARTH, 1)[0])
 
 
 SNOWY = rock(ROCK, SNOW)

@@ -67,6 +67,8 @@ class SintelConfig(LandscapeConfig):
     it sets the baseline."""
     focus_height_share: Range = (0.35, 0.8)
     """Height of that person, as a share of the image height."""
+    sky_strength: Range = (0.4, 1.3)
+    """Brightness of the sky's light."""
     fog_share: float = 0.6
     """Share of the scenes with fog in the final pass, 0..1."""
     people: Count = (1, 4)
@@ -99,6 +101,8 @@ class _Place:
     """0 rounded hills .. 1 sharp crests."""
     clearing: Range
     """Radius of the level middle, relative to half the land's side."""
+    rockiness: float
+    """Share of the configured number of rocks that lie about."""
     furnish: Callable[[np.random.Generator, SintelConfig, _Plan], None]
 
 
@@ -126,8 +130,10 @@ def sample_sintel(rng: np.random.Generator, config: SintelConfig) -> Scene:
     people = _people(rng, config, plan)
     plan.place.furnish(rng, config, plan)
     stones = (plan.place.stones, plan.place.stones)
-    boulders(rng, plan.garden, "rock", integer(rng, *config.boulders), stones, (0.7, 9.0), (0.03, 0.22))
-    boulders(rng, plan.garden, "crag", integer(rng, 3, 8), stones, (8.0, 30.0), (0.4, 1.6))
+    rocks = round(plan.place.rockiness * integer(rng, *config.boulders))
+    boulders(rng, plan.garden, "rock", rocks, stones, (0.8, 9.0), (0.025, 0.16))
+    crags = round(plan.place.rockiness * integer(rng, 4, 9))
+    boulders(rng, plan.garden, "crag", crags, stones, (9.0, 30.0), (0.3, 1.3))
     base = Scene(
         family="sintel",
         frames=config.frames,
@@ -176,7 +182,7 @@ def _people(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> int:
     stage, d = plan.stage, plan.depth_m
     placed = 0
     for index in range(integer(rng, *config.people)):
-        figure = sample_person(rng, 56 if index == 0 else 44)
+        figure = sample_person(rng, 52 if index == 0 else 38)
         scale_m = PERSON_M * uniform(rng, 0.92, 1.06)
         right = uniform(rng, -0.45, 0.45)
         # Mostly seen from the front or the side, now and then from behind.
@@ -425,12 +431,12 @@ def _lights(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> tupl
 
 
 _PLACES: dict[str, _Place] = {
-    "mountain": _Place(0.2, ground(HEATH), rock(), (0.1, 0.3), (0.5, 1.0), (0.08, 0.2), _mountain),
-    "snow": _Place(0.17, grains(SNOW), SNOWY, (0.08, 0.28), (0.4, 1.0), (0.08, 0.2), _snow),
-    "desert": _Place(0.15, grains(SAND), DESERT_ROCK, (0.02, 0.12), (0.0, 0.5), (0.05, 0.2), _desert),
-    "bamboo": _Place(0.14, ground(DRY_GRASS), rock(), (0.05, 0.25), (0.2, 0.7), (0.1, 0.2), _bamboo),
-    "ruins": _Place(0.18, ground(HEATH), rock(), (0.03, 0.2), (0.2, 0.9), (0.1, 0.3), _ruins),
-    "town": _Place(0.16, paving, rock(ROCK, EARTH), (0.05, 0.25), (0.3, 0.9), (0.2, 0.4), _town),
+    "mountain": _Place(0.2, ground(HEATH), rock(), (0.04, 0.18), (0.5, 1.0), (0.08, 0.2), 1.0, _mountain),
+    "snow": _Place(0.17, grains(SNOW), SNOWY, (0.04, 0.18), (0.4, 1.0), (0.08, 0.2), 0.8, _snow),
+    "desert": _Place(0.15, grains(SAND), DESERT_ROCK, (0.01, 0.07), (0.0, 0.5), (0.05, 0.2), 1.0, _desert),
+    "bamboo": _Place(0.14, ground(DRY_GRASS), rock(), (0.03, 0.15), (0.2, 0.7), (0.1, 0.2), 0.5, _bamboo),
+    "ruins": _Place(0.18, ground(HEATH), rock(), (0.02, 0.14), (0.2, 0.9), (0.1, 0.3), 0.6, _ruins),
+    "town": _Place(0.16, paving, rock(ROCK, EARTH), (0.03, 0.16), (0.3, 0.9), (0.2, 0.4), 0.25, _town),
 }
 
 FAMILY = Family(name="sintel", config=SintelConfig, sample=sample_sintel)

@@ -26,7 +26,7 @@ from scenes.spec import Texture
 
 
 @dataclass(frozen=True)
-class Bark(Texture):
+class RoughBark(Texture):
     """Upright ridges with dark cracks between them, patches of lichen: trunks, weathered timber."""
 
     size: int
@@ -251,7 +251,7 @@ class Hair(Texture):
 
 
 @dataclass(frozen=True)
-class Foliage(Texture):
+class LeafVeins(Texture):
     """The flesh of leaves: blotches, a net of pale veins, brown edges here and there."""
 
     size: int

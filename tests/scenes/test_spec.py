@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
+from scenes import discovery
 from scenes.motion import exposure_times, key_times, quaternion, shifted, wander
 from scenes.shapes.basic import Box
-from scenes.spec import SceneObject, StereoCamera, Trajectory
+from scenes.spec import SceneObject, StereoCamera, Texture, Trajectory
+from scenes.textures.plain import SolidColor
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -113,3 +116,14 @@ def test_an_objects_pose_scales_before_it_turns() -> None:
     )
     np.testing.assert_allclose(thing.pose(0.0) @ (1, 0, 0, 1), (5, 2, 0, 1), atol=1e-12)
     np.testing.assert_allclose(thing.pose(0.0) @ (0, 1, 1, 1), (2, 0, 4, 1), atol=1e-12)
+
+
+def test_two_plug_ins_of_one_name_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files say which kind a record is by its name alone: a second one would silently take its place."""
+    one, two = ModuleType("scenes.textures.one"), ModuleType("scenes.textures.two")
+    for module in (one, two):
+        member = type("Twin", (SolidColor,), {"__module__": module.__name__})
+        monkeypatch.setattr(module, "Twin", member, raising=False)
+    monkeypatch.setattr(discovery, "modules_in", lambda _: [one, two])
+    with pytest.raises(TypeError, match=r"one and scenes\.textures\.two both define Twin"):
+        discovery.concrete_subclasses(one, Texture)  # type: ignore[type-abstract]
