@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from training.errors import TrainingError
+from training.free import FreeInputs, as_free_inputs
 from training.inference import estimate
 from training.networks import ConfNet, GradNet
 from training.weights import StoredNetwork, has_weights, load_confnet, load_gradnet, load_regressor
@@ -87,6 +88,59 @@ class StereoPredictor:
     def _as_tensor(self, image: NDArray[np.uint8]) -> Tensor:
         batch = torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1)[None]
         return batch.to(self._device).float() / 255
+
+
+class FreePredictor:
+    """ConfNet and GradNet of a run folder for the disparity of any predictor (`confnet_free`, `gradnet_free`)."""
+
+    def __init__(self, run: Path | str, device: str = "cpu") -> None:
+        """Read what the folder holds, both networks being optional.
+
+        Raises:
+            TrainingError: no such folder, or damaged files.
+        """
+        run = Path(run)
+        if not run.is_dir():
+            raise TrainingError(f"{run}: there is no such run folder")
+        self._device = torch.device(device)
+        self._confnet: ConfNet | None = None
+        self._gradnet: GradNet | None = None
+        if has_weights(run, "confnet_free"):
+            self._confnet = load_confnet(run, "confnet_free").network.to(self._device)
+        if has_weights(run, "gradnet_free"):
+            self._gradnet = load_gradnet(run, "gradnet_free").network.to(self._device)
+
+    @torch.no_grad()
+    def predict(
+        self,
+        left: NDArray[np.uint8],
+        disparity: NDArray[np.float32],
+        disparity_right: NDArray[np.float32],
+    ) -> Prediction:
+        """Confidence and gradient of a left view's disparity; the disparity itself with its holes filled.
+
+        Args:
+            left: (H, W, 3) uint8 sRGB.
+            disparity, disparity_right: (H, W) px, NaN in holes; the right view's confirms the left view's.
+
+        Raises:
+            TrainingError: arrays of different sizes.
+        """
+        for name, maps in (("left", disparity), ("right", disparity_right)):
+            if maps.shape != left.shape[:2]:
+                raise TrainingError(
+                    f"the {name} disparity is {maps.shape[1]}x{maps.shape[0]}, "
+                    f"the image {left.shape[1]}x{left.shape[0]}"
+                )
+        inputs = FreeInputs(*(maps.to(self._device) for maps in as_free_inputs(disparity, disparity_right)))
+        image = torch.from_numpy(np.ascontiguousarray(left)).permute(2, 0, 1)[None].to(self._device)
+        image, features = image.float() / 255, inputs.features
+        confidence = gradient = None
+        if self._confnet is not None:
+            confidence = _as_array(self._confnet.confidence(image, features, inputs.consistency))[..., 0]
+        if self._gradnet is not None:
+            gradient = _as_array(self._gradnet(image, features))
+        return Prediction(_as_array(inputs.disparity)[..., 0], confidence, gradient)
 
 
 Head = TypeVar("Head", ConfNet, GradNet)

@@ -10,15 +10,17 @@ that work at the features' half resolution.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, get_args
 
+from matching import SGBMParameters
 from training.augmentation import AugmentationConfig
 from training.errors import TrainingError
+from training.free import FREE_FEATURES
 from training.losses import STAGE_WEIGHTS, STATIC_WEIGHTS, ScaleWeights
 from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
 
-Task = Literal["regressor", "regressor_f", "confnet", "gradnet"]
-TASKS: tuple[Task, ...] = ("regressor", "regressor_f", "confnet", "gradnet")
+Task = Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free"]
+TASKS: tuple[Task, ...] = get_args(Task)
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,22 @@ class GradNetPreset(Preset):
     network: HeadConfig = field(default_factory=lambda: PUBLISHED_GRADNET)
     gradient_threshold_px: float = 1.0
     """Larger forward differences are discontinuities and masked out. One digit in the paper, most likely 1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeConfNetPreset(ConfNetPreset):
+    """ConfNet on the disparity of semi-global matching, without a regressor (ours)."""
+
+    matcher: SGBMParameters = field(default_factory=SGBMParameters)
+    """Matches every crop and every validation frame as the run goes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeGradNetPreset(GradNetPreset):
+    """GradNet on the disparity of semi-global matching, without a regressor (ours)."""
+
+    matcher: SGBMParameters = field(default_factory=SGBMParameters)
+    """Matches every crop and every validation frame as the run goes."""
 
 
 def _every(interval: int, end: int) -> tuple[int, ...]:
@@ -233,11 +251,50 @@ TINY_GRADNET = replace(
     validation_samples=16,
 )
 
+FREE_DILATIONS = (1, 2, 4, 4)
+"""With half resolution a reach of 22 pixels to every side."""
+SMALL_FREE_CONFNET = FreeConfNetPreset(
+    steps=SMALL_CONFNET.steps,
+    batch_size=4,
+    crop_width=320,
+    crop_height=128,
+    optimizer=SMALL_CONFNET.optimizer,
+    augmentation=SMALL_AUGMENTATION,
+    network=replace(SMALL_CONFNET.network, feature_channels=FREE_FEATURES, dilations=FREE_DILATIONS),
+    validation_interval=500,
+)
+TINY_FREE_CONFNET = replace(
+    SMALL_FREE_CONFNET,
+    steps=200,
+    optimizer=TINY_CONFNET.optimizer,
+    validation_interval=100,
+    validation_samples=16,
+)
+SMALL_FREE_GRADNET = FreeGradNetPreset(
+    steps=SMALL_GRADNET.steps,
+    batch_size=4,
+    crop_width=320,
+    crop_height=128,
+    optimizer=SMALL_GRADNET.optimizer,
+    augmentation=SMALL_AUGMENTATION,
+    network=replace(SMALL_GRADNET.network, feature_channels=FREE_FEATURES, dilations=FREE_DILATIONS),
+    validation_interval=500,
+)
+TINY_FREE_GRADNET = replace(
+    SMALL_FREE_GRADNET,
+    steps=200,
+    optimizer=TINY_GRADNET.optimizer,
+    validation_interval=100,
+    validation_samples=16,
+)
+
 PRESETS: dict[Task, dict[str, Preset]] = {
     "regressor": {"tiny": TINY_REGRESSOR, "small": SMALL_REGRESSOR, "full": FULL_REGRESSOR},
     "regressor_f": {"tiny": TINY_FINE_TUNING, "small": SMALL_FINE_TUNING, "full": FULL_FINE_TUNING},
     "confnet": {"tiny": TINY_CONFNET, "small": SMALL_CONFNET, "full": FULL_CONFNET},
     "gradnet": {"tiny": TINY_GRADNET, "small": SMALL_GRADNET, "full": FULL_GRADNET},
+    "confnet_free": {"tiny": TINY_FREE_CONFNET, "small": SMALL_FREE_CONFNET},
+    "gradnet_free": {"tiny": TINY_FREE_GRADNET, "small": SMALL_FREE_GRADNET},
 }
 
 

@@ -25,12 +25,22 @@ from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.presets import (
     ConfNetPreset,
     FineTuningPreset,
+    FreeConfNetPreset,
+    FreeGradNetPreset,
     GradNetPreset,
     Preset,
     RegressorPreset,
     find_preset,
 )
-from training.tasks import ConfNetTask, FineTuningTask, GradNetTask, RegressorTask, StereoTask
+from training.tasks import (
+    ConfNetTask,
+    FineTuningTask,
+    FreeConfNetTask,
+    FreeGradNetTask,
+    GradNetTask,
+    RegressorTask,
+    StereoTask,
+)
 from training.weights import (
     TrainingSummary,
     copy_weights,
@@ -62,7 +72,8 @@ def train(
     """Train one network and leave it in the run folder.
 
     Args:
-        task: `regressor`, `regressor_f` (eq. 9, starts from a regressor), `confnet` or `gradnet` (on a frozen one).
+        task: `regressor`, `regressor_f` (eq. 9, starts from a regressor), `confnet` or `gradnet` (on a frozen one),
+            `confnet_free` or `gradnet_free` (on semi-global matching, need no regressor).
         data: data sets (`datagen.source.open_source`) and their weights, how often each is drawn from; their train
             splits are trained on, their val splits decide which weights are kept.
         out: run folder; receives `<task>.safetensors`, `<task>.json` and `logs/<task>/`.
@@ -132,6 +143,8 @@ def _build_task(
     """The task of a preset with its networks, and the digest of the regressor a head is built on."""
     if isinstance(preset, RegressorPreset):
         return RegressorTask(preset, _new_regressor(preset, module, init), steps, seed), None
+    if isinstance(preset, FreeConfNetPreset | FreeGradNetPreset):
+        return _build_free_task(preset, module, steps, seed), None
     regressor = load_regressor(_with_regressor(out, init))
     if isinstance(preset, FineTuningPreset):
         return FineTuningTask(preset, regressor.network, steps, seed), None
@@ -147,6 +160,19 @@ def _build_task(
         raise TypeError(f"no task trains a {type(preset).__name__}")
     _calibrate(task, module)
     return task, regressor.sha256
+
+
+def _build_free_task(
+    preset: FreeConfNetPreset | FreeGradNetPreset, module: StereoDataModule, steps: int, seed: int
+) -> StereoTask:
+    """The task of a head that needs no regressor."""
+    task: FreeConfNetTask | FreeGradNetTask
+    if isinstance(preset, FreeConfNetPreset):
+        task = FreeConfNetTask(preset, ConfNet(preset.network), steps, seed)
+    else:
+        task = FreeGradNetTask(preset, GradNet(preset.network), steps, seed)
+    _calibrate(task, module)
+    return task
 
 
 def _new_regressor(preset: RegressorPreset, module: StereoDataModule, init: Path | None) -> DispNetCorr1D:
@@ -172,9 +198,10 @@ def _with_regressor(out: Path, init: Path | None) -> Path:
 
 
 @torch.no_grad()
-def _calibrate(task: ConfNetTask | GradNetTask, module: StereoDataModule) -> None:
+def _calibrate(
+    task: ConfNetTask | GradNetTask | FreeConfNetTask | FreeGradNetTask, module: StereoDataModule
+) -> None:
     """Give a head the mean and deviation of its input channels over the first crops of the run."""
-    task.regressor.eval()
     batches = itertools.islice(module.block(0), CALIBRATION_BATCHES)
     joined = torch.cat([task.network.joined_input(*task.head_inputs(batch)[0]) for batch in batches])
     task.network.standardize(joined.mean((0, 2, 3)), joined.std((0, 2, 3)))

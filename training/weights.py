@@ -87,14 +87,14 @@ def load_regressor(run: Path, task: str = "regressor") -> StoredNetwork[DispNetC
     return _load(run, task, lambda config: DispNetCorr1D(_structure(config, DispNetConfig)))
 
 
-def load_confnet(run: Path) -> StoredNetwork[ConfNet]:
-    """Read the ConfNet of a run folder. Raises TrainingError, naming what is wrong."""
-    return _load(run, "confnet", lambda config: ConfNet(_structure(config, HeadConfig)))
+def load_confnet(run: Path, task: str = "confnet") -> StoredNetwork[ConfNet]:
+    """Read `confnet` or `confnet_free` of a run folder. Raises TrainingError, naming what is wrong."""
+    return _load(run, task, lambda config: ConfNet(_structure(config, HeadConfig)))
 
 
-def load_gradnet(run: Path) -> StoredNetwork[GradNet]:
-    """Read the GradNet of a run folder. Raises TrainingError, naming what is wrong."""
-    return _load(run, "gradnet", lambda config: GradNet(_structure(config, HeadConfig)))
+def load_gradnet(run: Path, task: str = "gradnet") -> StoredNetwork[GradNet]:
+    """Read `gradnet` or `gradnet_free` of a run folder. Raises TrainingError, naming what is wrong."""
+    return _load(run, task, lambda config: GradNet(_structure(config, HeadConfig)))
 
 
 def read_summary(run: Path, task: str) -> TrainingSummary:

@@ -22,9 +22,13 @@ class Train:
     """
 
     task: Annotated[
-        tyro.conf.Positional[Literal["regressor", "regressor_f", "confnet", "gradnet"]], shown("TASK")
+        tyro.conf.Positional[
+            Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free"]
+        ],
+        shown("TASK"),
     ]
-    """regressor (DispNetCorr1D), regressor_f (fine-tuned on gradients too), confnet or gradnet."""
+    """regressor (DispNetCorr1D), regressor_f (fine-tuned on gradients too), confnet or gradnet; confnet_free and
+    gradnet_free need no regressor: they learn from semi-global matching and serve any disparity."""
     data: Annotated[tuple[str, ...], shown("DATA[:WEIGHT]")]
     """Data sets, each with how often it is drawn from relative to the others (default 1): folders or URLs, with
     FORMAT: in front where the folder does not tell, #0-99 behind for a part."""

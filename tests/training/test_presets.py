@@ -65,8 +65,7 @@ def test_full_heads() -> None:
     assert fine_tuning.gradient_weight == 5.0
 
 
-@pytest.mark.parametrize("task", PRESETS)
-@pytest.mark.parametrize("name", ["tiny", "small", "full"])
+@pytest.mark.parametrize(("task", "name"), [(task, name) for task in PRESETS for name in PRESETS[task]])
 def test_presets_are_coherent(task: str, name: str) -> None:
     preset = find_preset(task, name)
     assert preset.crop_width % 64 == preset.crop_height % 64 == 0

@@ -31,6 +31,9 @@ class HeadConfig:
     half_resolution: bool = False
     """Work at the features' own resolution and upsample the outputs bilinearly: a quarter of the cost (ours).
     The outputs keep their units: probabilities, and pixels per full-resolution pixel."""
+    dilations: tuple[int, int, int, int] = (1, 1, 1, 1)
+    """Of the 3x3 convolutions: how far apart, in pixels, they look. Features of a regressor have seen their
+    surroundings already; a disparity's own have not (ours)."""
 
 
 class PixelHead(nn.Module):
@@ -47,8 +50,8 @@ class PixelHead(nn.Module):
         self.register_buffer("input_std", torch.ones(in_channels))
         layers: list[nn.Module] = []
         channels = in_channels
-        for _ in range(4):
-            layers.append(nn.Conv2d(channels, config.width, 3, 1, 1))
+        for dilation in config.dilations:
+            layers.append(nn.Conv2d(channels, config.width, 3, 1, dilation, dilation))
             if config.normalization == "batch":
                 layers.append(nn.BatchNorm2d(config.width))
             layers.append(_activation(activation))
@@ -71,7 +74,7 @@ class PixelHead(nn.Module):
         """
         height, width = inputs[0].shape[-2:]
         if self.config.half_resolution:
-            height, width = height // 2, width // 2
+            height, width = max(height // 2, 1), max(width // 2, 1)
         return torch.cat([_resized(x, height, width) for x in inputs], dim=1)
 
     def standardize(self, mean: Tensor, std: Tensor) -> None:

@@ -1,7 +1,16 @@
 """The Lightning modules, one a task."""
 
 from training.tasks.base import StereoTask
+from training.tasks.free import FreeConfNetTask, FreeGradNetTask
 from training.tasks.heads import ConfNetTask, GradNetTask
 from training.tasks.regressor import FineTuningTask, RegressorTask
 
-__all__ = ["ConfNetTask", "FineTuningTask", "GradNetTask", "RegressorTask", "StereoTask"]
+__all__ = [
+    "ConfNetTask",
+    "FineTuningTask",
+    "FreeConfNetTask",
+    "FreeGradNetTask",
+    "GradNetTask",
+    "RegressorTask",
+    "StereoTask",
+]

@@ -27,7 +27,7 @@ from viewing import Picture, confidence_picture, error_picture, gradient_picture
 class _HeadTask(StereoTask):
     def __init__(self, preset: Preset, regressor: DispNetCorr1D, steps: int, seed: int) -> None:
         super().__init__(preset, steps, seed)
-        self.regressor = regressor.requires_grad_(False)
+        self.regressor = regressor.requires_grad_(False).eval()
 
     @abstractmethod
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:

@@ -1,0 +1,143 @@
+"""ConfNet and GradNet without a regressor: what they see, that they learn, and what they answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from matching import SGBMParameters, fill_background, left_right_consistency, match_both
+from tests.training.synthetic import random_pair, write_dataset
+from training.augmentation import NO_AUGMENTATION
+from training.errors import TrainingError
+from training.free import FREE_FEATURES, as_free_inputs, disparity_features, match_batch
+from training.metrics import optimal_auc, sparsification_auc
+from training.predict import FreePredictor
+from training.presets import FreeConfNetPreset, FreeGradNetPreset, find_preset
+from training.train import train
+from training.weights import load_confnet
+
+MATCHER = SGBMParameters(max_disparity_px=48)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_thread() -> Iterator[None]:
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+def quick(task: str) -> FreeConfNetPreset | FreeGradNetPreset:
+    preset = find_preset(task, "tiny")
+    assert isinstance(preset, FreeConfNetPreset | FreeGradNetPreset)
+    return replace(
+        preset,
+        crop_width=128,
+        crop_height=64,
+        batch_size=2,
+        validation_interval=100,
+        augmentation=NO_AUGMENTATION,
+        matcher=MATCHER,
+        network=replace(preset.network, width=16, hidden=16, dropout=0.0),
+    )
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run folder with both networks, trained without a regressor on four pairs."""
+    data = write_dataset(tmp_path_factory.mktemp("set"), 0, train=4, val=2)
+    folder = tmp_path_factory.mktemp("run")
+    for task in ("confnet_free", "gradnet_free"):
+        train(task, [(data, 1.0)], folder, quick(task), steps=100, progress=False)
+    return folder
+
+
+def test_features_are_what_they_say() -> None:
+    rng = np.random.default_rng(0)
+    disparity = rng.uniform(0, 30, (12, 20)).astype(np.float32)
+    disparity[3:5, 4:9] = np.nan
+    right = np.roll(disparity, -2, axis=1)
+    inputs = as_free_inputs(disparity, right)
+    filled, consistency = fill_background(disparity), left_right_consistency(disparity, right)
+    np.testing.assert_array_equal(inputs.disparity[0, 0], filled)
+    np.testing.assert_array_equal(inputs.consistency[0, 0], consistency)
+    features = disparity_features(*inputs)[0].numpy()
+    assert features.shape == (FREE_FEATURES, 12, 20)
+    np.testing.assert_array_equal(features[0], filled)
+    np.testing.assert_array_equal(features[1], np.isfinite(disparity))
+    np.testing.assert_array_equal(features[2], (consistency >= 0) & (consistency <= 1))
+    np.testing.assert_allclose(features[3][:, :-1], np.diff(filled, axis=1).clip(-4, 4), atol=1e-5)
+    np.testing.assert_allclose(features[4][:-1], np.diff(filled, axis=0).clip(-4, 4), atol=1e-5)
+    assert (features[3][:, -1] == 0).all()
+    assert (features[4][-1] == 0).all()
+    np.testing.assert_allclose(
+        features[5][6, 7], np.clip(filled[6, 7] - filled[2:11, 3:12].mean(), -8, 8), atol=1e-4
+    )
+
+
+def test_nothing_known_is_still_finite() -> None:
+    nothing = np.full((6, 8), np.nan, np.float32)
+    inputs = as_free_inputs(nothing, nothing)
+    assert torch.isfinite(inputs.features).all()
+    assert not inputs.known.any()
+
+
+def test_a_batch_is_matched_pair_by_pair() -> None:
+    pairs = [random_pair(np.random.default_rng(seed), 48, 96) for seed in (0, 1)]
+    views = [np.stack([getattr(pair, eye) for pair in pairs]) for eye in ("left", "right")]
+    left, right = (torch.from_numpy(view).permute(0, 3, 1, 2).float() / 255 for view in views)
+    matched = match_batch(left, right, MATCHER)
+    for index, pair in enumerate(pairs):
+        alone = as_free_inputs(*match_both(pair.left, pair.right, MATCHER))
+        for got, expected in zip(matched, alone, strict=True):
+            torch.testing.assert_close(got[index : index + 1], expected)
+
+
+@pytest.mark.slow
+def test_they_learn_what_matching_gets_wrong(run: Path) -> None:
+    """On a pair they have not seen: confident where matching is right, slopes nearer to the truth than its own."""
+    pair = random_pair(np.random.default_rng(50), 64, 128)
+    left, right = match_both(pair.left, pair.right, MATCHER)
+    answer = FreePredictor(run).predict(pair.left, left, right)
+    assert answer.confidence is not None
+    assert answer.gradient is not None
+    np.testing.assert_array_equal(answer.disparity, fill_background(left))
+    wrong = np.abs(answer.disparity - pair.disparity_left) > 1
+    assert 0.02 < wrong.mean() < 0.6
+    maps = (torch.from_numpy(m) for m in (answer.confidence, answer.disparity, pair.disparity_left))
+    rate = float(wrong.mean())
+    best = float(optimal_auc(torch.tensor(rate)))
+    area = float(sparsification_auc(*maps))
+    assert area < best + 0.4 * (rate - best)
+    slopes = np.diff(pair.disparity_left, axis=1)
+    smooth = np.abs(slopes) < 1
+    errors = [
+        np.abs(slope - slopes)[smooth].mean()
+        for slope in (answer.gradient[:, :-1, 0], np.diff(answer.disparity, axis=1))
+    ]
+    assert errors[0] < 0.7 * errors[1]
+
+
+@pytest.mark.slow
+def test_networks_are_optional_and_checked(run: Path, tmp_path: Path) -> None:
+    pair = random_pair(np.random.default_rng(1), 33, 47)
+    disparity = pair.disparity_left
+    answer = FreePredictor(run).predict(pair.left, disparity, pair.disparity_right)
+    assert answer.confidence is not None
+    assert answer.confidence.shape == (33, 47)
+    bare = FreePredictor(tmp_path).predict(pair.left, disparity, pair.disparity_right)
+    assert bare.confidence is None
+    assert bare.gradient is None
+    with pytest.raises(TrainingError, match="no such run folder"):
+        FreePredictor(tmp_path / "nothing")
+    with pytest.raises(TrainingError, match="right disparity is 47x20"):
+        FreePredictor(run).predict(pair.left, disparity, pair.disparity_right[:20])
+    (tmp_path / "confnet_free.safetensors").write_bytes((run / "gradnet_free.safetensors").read_bytes())
+    (tmp_path / "confnet_free.json").write_bytes((run / "gradnet_free.json").read_bytes())
+    with pytest.raises(TrainingError, match="describes a gradnet_free"):
+        load_confnet(tmp_path, "confnet_free")
