@@ -15,13 +15,12 @@ from typing import Any
 
 import cattrs
 
+from refine.baselines.ours import Ours
 from refine.methods import Method, default_methods, known_methods
 from refine.tuning import Trial, TunedMethod
 from storage import write_text
 
 FORMAT = 1
-FILE_NAME = "parameters.json"
-"""Name of the file in a run folder, where it is found without being named."""
 
 _CONVERTER = cattrs.Converter(forbid_extra_keys=True)
 
@@ -40,6 +39,13 @@ class Settings:
     def method(self, name: str) -> Method:
         """The named method, with validated parameters if there are any; raises ValueError if there is none such."""
         return self.methods[name] if name in self.methods else default_methods((name,))[0]
+
+    @property
+    def ours(self) -> Ours:
+        """The MRF."""
+        method = self.method(Ours.name)
+        assert isinstance(method, Ours)
+        return method
 
     def rows(self, names: tuple[str, ...] = ()) -> tuple[Method, ...]:
         """`default_methods` with validated parameters."""

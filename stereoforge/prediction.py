@@ -2,24 +2,77 @@
 
 from __future__ import annotations
 
+import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from datagen.frame import StereoFrame
+from matching import SGBMParameters, left_right_consistency, match_both
 from refine.evaluation import EvaluationFrame
-from refine.settings import FILE_NAME, Settings, read_settings
-from training.predict import StereoPredictor
+from refine.handmade import consistency_confidence, local_slopes
+from refine.settings import Settings, read_settings
+from stereoforge.errors import CommandError, UsageError
+from training.predict import FreePredictor, Prediction, StereoPredictor
 from training.weights import has_weights
+
+PredictorName = Literal["networks", "sgbm"]
+
+Image = NDArray[np.uint8]
+Map = NDArray[np.float32]
+
+
+class PairPredictor(Protocol):
+    """Anything that gives a disparity for a pair, and what else it knows."""
+
+    def predict(self, left: Image, right: Image) -> Prediction: ...
+
+
+@dataclass(frozen=True)
+class MatchingPredictor:
+    """Semi-global matching, or a given disparity, with the networks that need no regressor, or without any."""
+
+    networks: FreePredictor | None
+    matcher: SGBMParameters
+
+    def predict(self, left: Image, right: Image) -> Prediction:
+        """Match the pair, and judge the match."""
+        return self.judge(left, *match_both(left, right, self.matcher))
+
+    def predict_for(
+        self, left: Image, right: Image, disparity: Map, disparity_right: Map | None
+    ) -> Prediction:
+        """Judge a given disparity (H, W), NaN in holes; the right view's is matched where it is not given."""
+        if disparity_right is None:
+            reach = max(self.matcher.max_disparity_px, math.ceil(float(np.nanmax(disparity))) + 16)
+            matcher = replace(self.matcher, max_disparity_px=min(reach, left.shape[1]))
+            disparity_right = match_both(left, right, matcher)[1]
+        return self.judge(left, disparity, disparity_right)
+
+    def judge(self, left: Image, disparity: Map, disparity_right: Map) -> Prediction:
+        """Confidence and gradients by the networks there are, else by hand."""
+        judged = Prediction(disparity, None, None)
+        if self.networks is not None:
+            judged = self.networks.predict(left, disparity, disparity_right)
+        confidence, gradient = judged.confidence, judged.gradient
+        if confidence is None:
+            consistency = left_right_consistency(disparity, disparity_right)
+            confidence = consistency_confidence(disparity, consistency, left)
+        if gradient is None:
+            gradient = local_slopes(disparity, confidence, left)
+        return Prediction(judged.disparity, confidence, gradient)
 
 
 @dataclass(frozen=True)
 class Predictors:
-    """Everything of a run folder that says something about a pair."""
+    """Everything that says something about a pair."""
 
-    networks: StereoPredictor
+    initial: PairPredictor
+    """Gives the disparity that is refined."""
     fine_tuned: StereoPredictor | None
     """The regressor fine-tuned on gradients, where there is one."""
 
@@ -30,7 +83,7 @@ class Predictors:
         """
         occlusion = sample.occlusion_left
         began = time.perf_counter()
-        prediction = self.networks.predict(sample.left, sample.right)
+        prediction = self.initial.predict(sample.left, sample.right)
         seconds = {"disparity": time.perf_counter() - began}
         fine_tuned = None
         if self.fine_tuned is not None:
@@ -51,18 +104,83 @@ class Predictors:
         )
 
 
-def open_predictors(run: Path, device: str = "cpu") -> Predictors:
+def open_predictors(run: Path, device: str = "cpu", predictor: PredictorName = "networks") -> Predictors:
     """What a run folder holds; raises TrainingError, naming what is wrong."""
+    if predictor == "sgbm":
+        return Predictors(open_matching(run, device), None)
     return Predictors(
-        networks=StereoPredictor(run, device),
-        fine_tuned=(StereoPredictor(run, device, "regressor_f") if has_weights(run, "regressor_f") else None),
+        initial=StereoPredictor(run, device),
+        fine_tuned=StereoPredictor(run, device, "regressor_f") if has_weights(run, "regressor_f") else None,
     )
 
 
-def open_settings(file: Path | None, run: Path | None) -> Settings:
+def open_matching(
+    run: Path | None, device: str = "cpu", matcher: SGBMParameters | None = None
+) -> MatchingPredictor:
+    """Semi-global matching with the networks of a run folder that need no regressor, if there is one."""
+    return MatchingPredictor(None if run is None else FreePredictor(run, device), matcher or SGBMParameters())
+
+
+def fallback_notes(run: Path | None) -> list[str]:
+    """A sentence for each network that a foreign disparity has to do without."""
+    where = "no run folder was given" if run is None else f"{run} has none"
+    notes = []
+    for task, instead in (
+        ("confnet_free", "confidence is taken from left-right consistency and texture"),
+        ("gradnet_free", "slopes are taken from the disparity itself"),
+    ):
+        if run is None or not has_weights(run, task):
+            notes.append(f"without a {task} ({where}), {instead}")
+    return notes
+
+
+def predict_pair(
+    left: Image,
+    right: Image,
+    given: tuple[Map, Map | None] | None,
+    run: Path | None,
+    device: str,
+    predictor: PredictorName,
+) -> tuple[Prediction, list[str]]:
+    """All that refining one pair takes, and sentences on what had to be done without.
+
+    Args:
+        given: The left view's disparity and perhaps the right view's, instead of a predictor.
+
+    Raises:
+        UsageError: Networks are asked for, and no run folder is given.
+        CommandError: The run folder lacks a network.
+        TrainingError: Anything wrong with the run folder, or with the images.
+    """
+    if given is not None or predictor == "sgbm":
+        if left.shape != right.shape:
+            raise CommandError(
+                f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
+                f"right {right.shape[1]}x{right.shape[0]}"
+            )
+        matching = open_matching(run, device)
+        answer = matching.predict(left, right) if given is None else matching.predict_for(left, right, *given)
+        return answer, fallback_notes(run)
+    if run is None:
+        raise UsageError(
+            "refine needs --weights, or a disparity from elsewhere: --disparity or --predictor sgbm"
+        )
+    answer = StereoPredictor(run, device).predict(left, right)
+    for name, found in (("confnet", answer.confidence), ("gradnet", answer.gradient)):
+        if found is None:
+            raise CommandError(f"{run}: has no {name}, which refining needs; train one into it")
+    return answer, []
+
+
+def parameters_file(run: Path, predictor: PredictorName = "networks") -> Path:
+    """Where a run folder keeps validated parameters: those that suit its networks, or another predictor."""
+    return run / ("parameters.json" if predictor == "networks" else f"parameters_{predictor}.json")
+
+
+def open_settings(file: Path | None, run: Path | None, predictor: PredictorName = "networks") -> Settings:
     """The methods' parameters: of the file, or of the one in the run folder, or the defaults."""
     if file is not None:
         return read_settings(file)
-    if run is not None and (run / FILE_NAME).exists():
-        return read_settings(run / FILE_NAME)
+    if run is not None and parameters_file(run, predictor).exists():
+        return read_settings(parameters_file(run, predictor))
     return Settings()

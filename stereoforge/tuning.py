@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from datagen import StereoDataset
+from datagen.source import DataSource
 from refine.evaluation import EvaluationFrame
 from refine.methods import Method, known_methods, table_order
 from refine.settings import Settings, read_settings, write_settings
@@ -100,32 +100,34 @@ class Tuning:
 
 
 def validation_frames(
-    datasets: Sequence[StereoDataset], predictors: Predictors, count: int
+    sources: Sequence[DataSource], predictors: Predictors, count: int
 ) -> list[EvaluationFrame]:
     """`count` frames with predictions, spread evenly over validation splits.
 
     Raises:
-        CommandError: If a data set is opened on another split: parameters are never chosen on a test split.
+        CommandError: If a data set has no splits, and it is not said which part of it to validate on.
+        DatasetError: If a data set has splits, but none for validation.
     """
-    for dataset in datasets:
-        if dataset.split != VALIDATION:
+    for source in sources:
+        if not source.format.splits and source.selection is None:
             raise CommandError(
-                f"{dataset.layout.root}: parameters are chosen on the validation split, never on {dataset.split}"
+                f"{source.location}: has no validation split, and parameters must not be chosen on what is tested; "
+                f"say which frames to choose on, such as {source.location}#0-19"
             )
-    samples = [sample for dataset in datasets for sample in dataset]
+    samples = [sample for source in sources for sample in source.frames(VALIDATION)]
     chosen = np.unique(np.linspace(0, len(samples) - 1, min(count, len(samples))).round().astype(int))
     with progress_bar() as progress:
         return [predictors.frame(samples[i]) for i in progress.track(chosen, description="predicting")]
 
 
-def describe(frames: Sequence[EvaluationFrame], data: Sequence[Path], objective: Objective) -> dict[str, Any]:
+def describe(frames: Sequence[EvaluationFrame], data: Sequence[str], objective: Objective) -> dict[str, Any]:
     """What is written of a search's circumstances; the fingerprint tells whether two searches are the same."""
     digest = hashlib.sha256(objective.encode())
     for frame in frames:
         for values in (frame.truth, frame.disparity, frame.confidence, frame.gradient, frame.fine_tuned):
             digest.update(b"-" if values is None else np.ascontiguousarray(values).tobytes())
     return {
-        "data": [str(folder) for folder in data],
+        "data": list(data),
         "split": VALIDATION,
         "frames": [frame.name for frame in frames],
         "objective": objective,

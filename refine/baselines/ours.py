@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from refine.confidence_shape import ConfidenceShape
 from refine.methods import EvaluationFrame, Method, MethodOutput
 from refine.mrf import DEFAULT_TOLERANCE, MRFSolution, SolverName, solve_mrf
@@ -35,23 +38,26 @@ class Ours(Method):
     tolerance: float = DEFAULT_TOLERANCE
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
-        return MethodOutput(disparity=self.solve(frame).disparity.astype("float32"))
-
-    def solve(self, frame: EvaluationFrame) -> MRFSolution:
-        """`run`, with the solver's account.
-
-        Raises:
-            ValueError: If the frame has no confidence or no gradient, or values the MRF cannot take.
-        """
         if frame.confidence is None or frame.gradient is None:
             raise ValueError(
                 f"{self.label} needs {', '.join(self.missing(frame))}; frame {frame.name} has none"
             )
+        solution = self.solve(frame.disparity, frame.confidence, frame.gradient, frame.image)
+        return MethodOutput(disparity=solution.disparity.astype(np.float32))
+
+    def solve(
+        self,
+        disparity: NDArray[np.float32],
+        confidence: NDArray[np.float32],
+        gradient: NDArray[np.float32],
+        image: NDArray[np.uint8],
+    ) -> MRFSolution:
+        """`refine.solve_mrf` with this method's parameters, the confidence shaped."""
         return solve_mrf(
-            frame.disparity,
-            self.shape.apply(frame.confidence),
-            frame.gradient,
-            frame.image,
+            disparity,
+            self.shape.apply(confidence),
+            gradient,
+            image,
             self.parameters,
             self.form,
             self.solver,

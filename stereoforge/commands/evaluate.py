@@ -26,9 +26,10 @@ class Evaluate:
     """Which split of the data sets; those without splits are taken whole."""
     methods: Annotated[str, shown("LIST", "all there are")] = ""
     """Rows of the tables, comma-separated."""
-    parameters: Annotated[
-        Path | None, shown("FILE", "parameters.json in the run folder, if there is one")
-    ] = None
+    predictor: Literal["networks", "sgbm"] = "networks"
+    """What gives the disparity that is refined: the run folder's networks, or semi-global matching, judged by its
+    confnet_free and gradnet_free."""
+    parameters: Annotated[Path | None, shown("FILE", "the run folder's, if it has one")] = None
     """The methods' parameters, as `stereoforge tune` writes them."""
     device: Annotated[str, shown("NAME")] = "cpu"
     """What the networks run on: cpu, cuda, ..."""
@@ -37,18 +38,19 @@ class Evaluate:
         from datagen.source import open_source
         from stereoforge.errors import UsageError
         from stereoforge.evaluation import evaluate_datasets, report_evaluation
-        from stereoforge.prediction import open_predictors, open_settings
+        from stereoforge.prediction import fallback_notes, open_predictors, open_settings
 
         methods = parse_methods(self.methods)
         if not self.data:
             raise UsageError("evaluate needs at least one data set")
         datasets = [open_source(source).frames(self.split) for source in self.data]
-        settings = open_settings(self.parameters, self.weights)
-        evaluation = evaluate_datasets(
-            datasets, open_predictors(self.weights, self.device), settings.rows(methods)
-        )
+        predictors = open_predictors(self.weights, self.device, self.predictor)
+        settings = open_settings(self.parameters, self.weights, self.predictor)
+        evaluation = evaluate_datasets(datasets, predictors, settings.rows(methods))
         names = [f"{source} ({self.split})" for source in self.data]
         files = report_evaluation(evaluation, names, self.weights, self.out)
+        for note in fallback_notes(self.weights) if self.predictor == "sgbm" else []:
+            console.print(note, markup=False)
         for name, reason in evaluation.skipped.items():
             console.print(f"{name} did not run: {reason}", markup=False)
         console.print(f"{files.html}: {len(evaluation.frames)} frames")

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
+from numpy.typing import NDArray
 
-from stereoforge.errors import CommandError
+from stereoforge.errors import UsageError
 from stereoforge.images import read_color_image
 from stereoforge.progress import console
 from stereoforge.values import shown
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from refine.mrf import MRFSolution
+    from training.predict import Prediction
 
 
 @dataclass(frozen=True)
 class Refine:
     """Predict disparity, confidence and gradients of a rectified pair, and refine the disparity with the MRF.
 
-    Writes disparity.pfm, disparity_initial.pfm, confidence.pfm, gradient.exr and overview.png.
+    With --disparity or --predictor sgbm the disparity comes from elsewhere; the run folder's confnet_free and
+    gradnet_free judge it, or, without them, consistency and texture. Writes disparity.pfm, disparity_initial.pfm,
+    confidence.pfm, gradient.exr and overview.png.
     """
 
     left: Annotated[tyro.conf.Positional[Path], shown("LEFT")]
@@ -27,39 +36,70 @@ class Refine:
     """Right picture, rectified and of the same size."""
     out: Annotated[Path, shown("DIR")]
     """Folder for the results."""
-    weights: Annotated[Path, shown("RUN")]
-    """Run folder with a regressor, a confnet and a gradnet."""
-    form: Literal["exact", "paper"] = "exact"
+    weights: Annotated[Path | None, shown("RUN", "none")] = None
+    """Run folder with a regressor, a confnet and a gradnet; for a disparity from elsewhere, with a confnet_free and a
+    gradnet_free."""
+    disparity: Annotated[Path | None, shown("FILE", "none")] = None
+    """Disparity of the left view in pixels to refine instead of predicting one: PFM (NaN, infinite or negative where
+    there is none) or 16-bit PNG as KITTI has it (value / 256, 0 where there is none)."""
+    disparity_right: Annotated[Path | None, shown("FILE", "matched by SGBM")] = None
+    """Disparity of the right view, which tells how far to trust the left one's."""
+    predictor: Literal["networks", "sgbm"] = "networks"
+    """What predicts the disparity: the run folder's networks, or OpenCV's semi-global matching."""
+    parameters: Annotated[Path | None, shown("FILE", "the run folder's, if it has one")] = None
+    """The MRF's parameters, as `stereoforge tune` writes them."""
+    form: Annotated[Literal["exact", "paper"] | None, shown("exact|paper", "as validated, else exact")] = None
     """exact minimises the energy; paper solves the paper's eq. 8 as printed."""
     device: Annotated[str, shown("NAME")] = "cpu"
     """What the networks run on: cpu, cuda, ..."""
 
     def run(self) -> None:
+        self._check()
         left, right = read_color_image(self.left), read_color_image(self.right)
+        from stereoforge.disparity_files import read_disparity
+        from stereoforge.prediction import open_settings, predict_pair
+
+        given = None
+        if self.disparity is not None:
+            size = (left.shape[0], left.shape[1])
+            other = None if self.disparity_right is None else read_disparity(self.disparity_right, size)
+            given = read_disparity(self.disparity, size), other
+        elsewhere: Literal["networks", "sgbm"] = "sgbm" if given is not None else self.predictor
+        ours = open_settings(self.parameters, self.weights, elsewhere).ours
+        if self.form is not None:
+            ours = replace(ours, form=self.form)
+        prediction, notes = predict_pair(left, right, given, self.weights, self.device, self.predictor)
+        assert prediction.confidence is not None
+        assert prediction.gradient is not None
+        solution = ours.solve(prediction.disparity, prediction.confidence, prediction.gradient, left)
+        self._write(left, prediction, solution)
+        for note in notes:
+            console.print(note, markup=False)
+        console.print(
+            f"{self.out}: disparity {solution.disparity.min():.1f} to {solution.disparity.max():.1f} px, refined in "
+            f"{solution.info.seconds:.2f} s ({solution.info.solver}); look at {self.out / 'overview.png'}",
+            markup=False,
+        )
+
+    def _check(self) -> None:
+        if self.disparity is not None and self.predictor != "networks":
+            raise UsageError("--disparity and --predictor sgbm both give the disparity; choose one")
+        if self.disparity_right is not None and self.disparity is None:
+            raise UsageError("--disparity-right goes with --disparity")
+
+    def _write(self, left: NDArray[np.uint8], prediction: Prediction, solution: MRFSolution) -> None:
         from datagen.formats import write_gradient, write_pfm, write_png
         from datagen.ground_truth import gradient_validity
-        from refine.mrf import solve_mrf
         from refine.overview import overview_picture
-        from training.predict import StereoPredictor
 
-        prediction = StereoPredictor(self.weights, self.device).predict(left, right)
-        if prediction.confidence is None or prediction.gradient is None:
-            missing = "confnet" if prediction.confidence is None else "gradnet"
-            raise CommandError(f"{self.weights}: has no {missing}, which refining needs; train one into it")
-        solution = solve_mrf(
-            prediction.disparity, prediction.confidence, prediction.gradient, left, form=self.form
-        )
         refined = solution.disparity.astype("float32")
-        # The networks predict a slope everywhere; only the differences inside the image exist.
+        assert prediction.confidence is not None
+        assert prediction.gradient is not None
+        # A slope is predicted everywhere; only the differences inside the image exist.
         inside = gradient_validity(prediction.gradient, float("inf"))
-        self.out.mkdir(parents=True, exist_ok=True)
         write_pfm(self.out / "disparity.pfm", refined)
         write_pfm(self.out / "disparity_initial.pfm", prediction.disparity)
         write_pfm(self.out / "confidence.pfm", prediction.confidence)
         write_gradient(self.out / "gradient.exr", prediction.gradient, inside)
         picture = overview_picture(left, prediction.disparity, prediction.confidence, refined)
         write_png(self.out / "overview.png", picture)
-        console.print(
-            f"{self.out}: disparity {refined.min():.1f} to {refined.max():.1f} px, refined in "
-            f"{solution.info.seconds:.2f} s ({solution.info.solver}); look at {self.out / 'overview.png'}"
-        )

@@ -21,14 +21,17 @@ class Tune:
     initial disparity's, fall. Run it again to continue where it stopped.
     """
 
-    data: Annotated[tyro.conf.Positional[tuple[Path, ...]], shown("DATA")]
-    """Data sets; their validation splits are used."""
+    data: Annotated[tyro.conf.Positional[tuple[str, ...]], shown("DATA")]
+    """Data sets, as for `evaluate`; their validation splits are used. One without splits needs #0-99 behind."""
     weights: Annotated[Path, shown("RUN")]
     """Run folder of the networks."""
     out: Annotated[Path | None, shown("FILE", "parameters.json in the run folder")] = None
-    """File for the parameters. One in the run folder is used by evaluate and refine without being named."""
+    """File for the parameters. One in the run folder is used by evaluate and refine without being named; those for
+    --predictor sgbm are in parameters_sgbm.json there."""
     methods: Annotated[str, shown("LIST", "all there are")] = ""
     """Methods to tune, comma-separated."""
+    predictor: Literal["networks", "sgbm"] = "networks"
+    """What gives the disparity that is refined: the run folder's networks, or semi-global matching."""
     frames: Annotated[int, shown("N")] = 20
     """Validation frames looked at, evenly spread; all are kept in memory."""
     objective: Literal["balanced", "bad", "epe", "gradient"] = "balanced"
@@ -44,14 +47,14 @@ class Tune:
         methods = parse_methods(self.methods)
         from rich.table import Table
 
-        from datagen import StereoDataset
-        from refine.settings import FILE_NAME
-        from stereoforge.prediction import open_predictors
-        from stereoforge.tuning import VALIDATION, Tuning, describe, shown_values, validation_frames
+        from datagen.source import open_source
+        from stereoforge.prediction import open_predictors, parameters_file
+        from stereoforge.tuning import Tuning, describe, shown_values, validation_frames
 
-        datasets = [StereoDataset(root, VALIDATION) for root in self.data]
-        frames = validation_frames(datasets, open_predictors(self.weights, self.device), self.frames)
-        out = self.weights / FILE_NAME if self.out is None else self.out
+        sources = [open_source(text) for text in self.data]
+        predictors = open_predictors(self.weights, self.device, self.predictor)
+        frames = validation_frames(sources, predictors, self.frames)
+        out = parameters_file(self.weights, self.predictor) if self.out is None else self.out
         tuned = Tuning(frames, out, describe(frames, self.data, self.objective), self.objective).run(methods)
         table = Table(
             "method", "default", "tuned", "parameters", title=f"{self.objective}, relative to the input"

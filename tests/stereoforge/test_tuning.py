@@ -9,6 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 import stereoforge.tuning as tuning
+from datagen import DatasetError
+from datagen.source import DataSource, SourceFormat
 from refine.settings import read_settings
 from stereoforge.errors import CommandError
 from stereoforge.tuning import Tuning, describe, validation_frames
@@ -22,7 +24,7 @@ def frames_with_networks():
 
 def search(out: Path, frames=None) -> Tuning:
     frames = frames or frames_with_networks()
-    return Tuning(frames, out, describe(frames, [Path("data")], "balanced"))
+    return Tuning(frames, out, describe(frames, ["data"], "balanced"))
 
 
 def test_an_interrupted_search_ends_as_an_uninterrupted_one(tmp_path, monkeypatch):
@@ -66,9 +68,17 @@ def test_methods_without_inputs_or_parameters_are_left_out(tmp_path):
     assert set(search(tmp_path / "p.json", frames).run()) == {"wmf"}
 
 
-def test_a_test_split_is_refused():
-    dataset = SimpleNamespace(split="test", layout=SimpleNamespace(root=Path("worlds")))
-    with pytest.raises(
-        CommandError, match="worlds: parameters are chosen on the validation split, never on test"
-    ):
-        validation_frames([dataset], None, 5)
+def test_a_set_without_a_validation_split_is_refused():
+    """One that belongs to every split at once needs its frames named; one with splits needs a `val` among them."""
+    unsplit = SourceFormat("flat", "a flat set", lambda _: True, lambda *_: [SimpleNamespace()] * 3)
+    with pytest.raises(CommandError, match=r"sets/flat: has no validation split.*sets/flat#0-19"):
+        validation_frames([DataSource(unsplit, "sets/flat")], None, 5)
+    tested = SourceFormat(
+        "split", "a split set", lambda _: True, lambda *_: [SimpleNamespace()], ("train", "test")
+    )
+    with pytest.raises(DatasetError, match="no split 'val'"):
+        validation_frames([DataSource(tested, "sets/split")], None, 5)
+    chosen = validation_frames(
+        [DataSource(unsplit, "sets/flat", (0, 1))], SimpleNamespace(frame=lambda _: "frame"), 5
+    )
+    assert chosen == ["frame", "frame"]

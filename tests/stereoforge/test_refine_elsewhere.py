@@ -1,0 +1,102 @@
+"""`stereoforge refine` on a disparity that none of the networks made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from datagen.formats import read_pfm, write_pfm, write_png
+from stereoforge.cli import main
+from tests.training.synthetic import random_pair
+from training.networks import ConfNet, GradNet
+from training.presets import FreeConfNetPreset, FreeGradNetPreset, find_preset
+from training.weights import TrainingSummary, save_weights
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray]:
+    """left.png, right.png and the truth of a pair; given.pfm, given.png: the truth spoilt, with holes."""
+    folder = tmp_path_factory.mktemp("pair")
+    pair = random_pair(np.random.default_rng(2), 64, 128)
+    write_png(folder / "left.png", pair.left)
+    write_png(folder / "right.png", pair.right)
+    given = pair.disparity_left + np.random.default_rng(0).normal(0, 0.5, (64, 128)).astype(np.float32)
+    given[20:30, 40:60] = np.inf
+    given[40:50, 90:110] += 9
+    write_pfm(folder / "given.pfm", given)
+    write_png(folder / "given.png", np.where(np.isfinite(given), given.clip(0) * 256, 0).astype(np.uint16))
+    write_pfm(folder / "given_right.pfm", pair.disparity_right)
+    return folder, pair.disparity_left
+
+
+def refine(folder: Path, out: Path, *more: str | Path, code: int = 0) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([str(a) for a in ("refine", folder / "left.png", folder / "right.png", "--out", out, *more)])
+    assert int(end.value.code or 0) == code
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        ("--disparity", "given.pfm"),
+        ("--disparity", "given.png"),
+        ("--disparity", "given.pfm", "--disparity-right", "given_right.pfm"),
+        ("--predictor", "sgbm"),
+    ],
+)
+def test_a_foreign_disparity_gets_better_without_any_network(world, tmp_path, source, capsys):
+    folder, truth = world
+    refine(folder, tmp_path / "r", *(folder / word if "given" in word else word for word in source))
+    said = " ".join(capsys.readouterr().out.split())
+    assert "without a confnet_free (no run folder was given), confidence is taken from" in said
+    assert "without a gradnet_free (no run folder was given), slopes are taken from" in said
+    refined, initial = (
+        read_pfm(tmp_path / "r" / name) for name in ("disparity.pfm", "disparity_initial.pfm")
+    )
+    assert np.isfinite(refined).all()
+    holes = ~np.isfinite(initial)
+    assert holes.any()
+    assert (read_pfm(tmp_path / "r" / "confidence.pfm")[holes] == 0).all()
+    before = np.abs(initial - truth)[~holes].mean()
+    assert np.abs(refined - truth)[~holes].mean() < before
+    assert {path.name for path in (tmp_path / "r").iterdir()} >= {"gradient.exr", "overview.png"}
+
+
+def test_the_run_folders_networks_judge_it(world, tmp_path, capsys):
+    """With both networks in the run folder nothing is done by hand, and the confidence is the network's."""
+    folder, _ = world
+    run = tmp_path / "run"
+    summary = TrainingSummary("custom", 1, 0, (("data", 1.0),), best_step=0)
+    confnet, gradnet = find_preset("confnet_free", "tiny"), find_preset("gradnet_free", "tiny")
+    assert isinstance(confnet, FreeConfNetPreset)
+    assert isinstance(gradnet, FreeGradNetPreset)
+    save_weights(run, "confnet_free", ConfNet(confnet.network), summary)
+    given = ("--disparity", folder / "given.pfm", "--weights", run)
+    refine(folder, tmp_path / "part", *given)
+    said = capsys.readouterr().out
+    assert "confnet_free" not in said
+    assert "without a gradnet_free" in said
+    save_weights(run, "gradnet_free", GradNet(gradnet.network), summary)
+    refine(folder, tmp_path / "whole", *given)
+    assert "without" not in capsys.readouterr().out
+    confidence = [read_pfm(tmp_path / name / "confidence.pfm") for name in ("part", "whole")]
+    np.testing.assert_array_equal(*confidence)
+    assert np.isfinite(read_pfm(tmp_path / "whole" / "disparity.pfm")).all()
+
+
+def test_contradictions_and_mistakes_are_sentences(world, tmp_path, capsys):
+    folder, _ = world
+    given = ("--disparity", folder / "given.pfm")
+    for code, more, reason in (
+        (2, (), "refine needs --weights, or a disparity from elsewhere"),
+        (2, (*given, "--predictor", "sgbm"), "choose one"),
+        (2, ("--disparity-right", folder / "given.pfm"), "goes with --disparity"),
+        (1, ("--disparity", folder / "left.png"), "left.png: a KITTI disparity is a 16-bit grey PNG"),
+        (1, (*given, "--weights", tmp_path / "gone"), "no such run folder"),
+        (1, (*given, "--parameters", tmp_path / "gone.json"), "gone.json: cannot be read"),
+    ):
+        refine(folder, tmp_path / "r", *more, code=code)
+        assert reason in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "r").exists()
