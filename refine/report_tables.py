@@ -9,7 +9,12 @@ from refine.evaluation import Evaluation, FrameScore, MethodScore
 from refine.paper import PAPER, PaperScore
 from refine.results import mean_aucs
 
-CONFIDENCE_LABELS = {"confnet": "ConfNet", "random": "Random order", "optimal": "Optimal order"}
+CONFIDENCE_LABELS = {
+    "confnet": "ConfNet",
+    "rdf": "Random forest",
+    "random": "Random order",
+    "optimal": "Optimal order",
+}
 BOUNDS = ("random", "optimal")
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from datagen.frame import StereoFrame
 from matching import SGBMParameters, left_right_consistency, match_both
 from refine.evaluation import EvaluationFrame
+from refine.forest import Forest, load_forest
 from refine.handmade import consistency_confidence, local_slopes
 from refine.settings import Settings, read_settings
 from stereoforge.errors import CommandError, UsageError
@@ -75,6 +76,8 @@ class Predictors:
     """Gives the disparity that is refined."""
     fine_tuned: StereoPredictor | None
     """The regressor fine-tuned on gradients, where there is one."""
+    forest: Forest | None = None
+    """The random forest on the initial disparity, where there is one."""
 
     def frame(self, sample: StereoFrame) -> EvaluationFrame:
         """One sample with all that is predicted for it, and how long that took.
@@ -100,8 +103,19 @@ class Predictors:
             gradient=prediction.gradient,
             right=sample.right,
             fine_tuned=fine_tuned,
+            other_confidences={}
+            if self.forest is None
+            else {"rdf": self._forest_confidence(sample, prediction)},
             seconds=seconds,
         )
+
+    def _forest_confidence(self, sample: StereoFrame, prediction: Prediction) -> Map:
+        assert self.forest is not None
+        assert isinstance(self.initial, StereoPredictor)
+        consistency = left_right_consistency(
+            prediction.disparity, self.initial.predict_right(sample.left, sample.right)
+        )
+        return self.forest.confidence(prediction.disparity, consistency, sample.left)
 
 
 def open_predictors(run: Path, device: str = "cpu", predictor: PredictorName = "networks") -> Predictors:
@@ -111,7 +125,13 @@ def open_predictors(run: Path, device: str = "cpu", predictor: PredictorName = "
     return Predictors(
         initial=StereoPredictor(run, device),
         fine_tuned=StereoPredictor(run, device, "regressor_f") if has_weights(run, "regressor_f") else None,
+        forest=load_forest(forest_file(run)) if forest_file(run).exists() else None,
     )
+
+
+def forest_file(run: Path) -> Path:
+    """Where a run folder keeps its random forest."""
+    return run / "rdf.safetensors"
 
 
 def open_matching(

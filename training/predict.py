@@ -66,6 +66,25 @@ class StereoPredictor:
         Raises:
             TrainingError: images of another kind, or of different sizes.
         """
+        self._check(left, right)
+        answer = estimate(
+            self._regressor, self._confnet, self._gradnet, self._as_tensor(left), self._as_tensor(right)
+        )
+        return Prediction(
+            disparity=_as_array(answer.disparity)[..., 0],
+            confidence=None if answer.confidence is None else _as_array(answer.confidence)[..., 0],
+            gradient=None if answer.gradient is None else _as_array(answer.gradient),
+        )
+
+    def predict_right(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """The right view's disparity (H, W): that of the mirrored, swapped pair, mirrored back. As `predict`."""
+        self._check(left, right)
+        views = (self._as_tensor(image[:, ::-1]) for image in (right, left))
+        mirrored = _as_array(estimate(self._regressor, None, None, *views).disparity)[..., 0]
+        return np.ascontiguousarray(mirrored[:, ::-1])
+
+    @staticmethod
+    def _check(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> None:
         for name, image in (("left", left), ("right", right)):
             if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
                 raise TrainingError(
@@ -76,14 +95,6 @@ class StereoPredictor:
                 f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
                 f"right {right.shape[1]}x{right.shape[0]}"
             )
-        answer = estimate(
-            self._regressor, self._confnet, self._gradnet, self._as_tensor(left), self._as_tensor(right)
-        )
-        return Prediction(
-            disparity=_as_array(answer.disparity)[..., 0],
-            confidence=None if answer.confidence is None else _as_array(answer.confidence)[..., 0],
-            gradient=None if answer.gradient is None else _as_array(answer.gradient),
-        )
 
     def _as_tensor(self, image: NDArray[np.uint8]) -> Tensor:
         batch = torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1)[None]

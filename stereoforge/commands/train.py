@@ -23,12 +23,13 @@ class Train:
 
     task: Annotated[
         tyro.conf.Positional[
-            Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free"]
+            Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free", "rdf"]
         ],
         shown("TASK"),
     ]
     """regressor (DispNetCorr1D), regressor_f (fine-tuned on gradients too), confnet or gradnet; confnet_free and
-    gradnet_free need no regressor: they learn from semi-global matching and serve any disparity."""
+    gradnet_free need no regressor: they learn from semi-global matching and serve any disparity. rdf: a
+    random forest as ConfNet's rival."""
     data: Annotated[tuple[str, ...], shown("DATA[:WEIGHT]")]
     """Data sets, each with how often it is drawn from relative to the others (default 1): folders or URLs, with
     FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
@@ -60,6 +61,9 @@ class Train:
             if value is not None and value < least:
                 raise UsageError(f"--{name} must be at least {least}, got {value}")
         data = [parse_weighted_source(text) for text in self.data]
+        if self.task == "rdf":
+            self._train_forest([source for source, _ in data])
+            return
         from training.train import train
 
         summary = train(
@@ -83,4 +87,20 @@ class Train:
                 if figures
                 else "; no validation split, so the last weights are kept"
             )
+        )
+
+    def _train_forest(self, data: list[str]) -> None:
+        for name, given in (("steps", self.steps), ("init", self.init), ("resume", self.resume)):
+            if given:
+                raise UsageError(
+                    f"--{name} is for networks; a forest is trained at once, on the regressor in --out"
+                )
+        from stereoforge.forest import PLANS, train_forest
+        from stereoforge.prediction import forest_file
+
+        device = "cpu" if self.device == "auto" else self.device
+        forest = train_forest(data, self.out, PLANS[self.preset], self.seed, device)
+        console.print(
+            f"{forest_file(self.out)}: {len(forest.roots)} trees of {len(forest.feature)} nodes in all",
+            markup=False,
         )

@@ -56,6 +56,18 @@ def test_what_was_saved_predicts_the_same(tmp_path: Path, images: tuple[np.ndarr
     assert read_summary(tmp_path, "regressor") == SUMMARY
 
 
+def test_the_right_view_is_the_left_of_the_mirrored_pair(
+    tmp_path: Path, images: tuple[np.ndarray, np.ndarray]
+) -> None:
+    save_run(tmp_path)
+    predictor = StereoPredictor(tmp_path)
+    left, right = images
+    mirrored = predictor.predict(right[:, ::-1], left[:, ::-1]).disparity[:, ::-1]
+    np.testing.assert_allclose(predictor.predict_right(left, right), mirrored, atol=1e-4)
+    with pytest.raises(TrainingError, match="differ in size"):
+        predictor.predict_right(left, right[:50])
+
+
 def test_heads_are_optional(tmp_path: Path, images: tuple[np.ndarray, np.ndarray]) -> None:
     save_run(tmp_path)
     (tmp_path / "confnet.safetensors").unlink()
