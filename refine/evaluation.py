@@ -9,36 +9,24 @@ from __future__ import annotations
 import heapq
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from refine.methods import EvaluationFrame, Method, MethodOutput, default_methods
-from refine.metrics import (
-    ErrorPool,
-    GradientPool,
-    SparsificationCurve,
-    bad_pixel_rate,
-    forward_gradient,
-    optimal_auc,
-    smooth_mask,
-    sparsification_curve,
-)
+from refine.methods import EvaluationFrame, Method, default_methods
+from refine.metrics import SparsificationCurve, bad_pixel_rate, optimal_auc, sparsification_curve
+from refine.pooling import MethodPool, MethodScore
 
 __all__ = [
     "Evaluation",
     "EvaluationFrame",
     "EvaluationOptions",
     "FrameScore",
-    "MethodScore",
     "Panel",
-    "RegionScore",
     "evaluate",
 ]
-
-REGIONS = ("all", "occ")
-"""All: every pixel with ground truth. Occ: those hidden from, or outside, the other view."""
 
 
 @dataclass(frozen=True)
@@ -57,39 +45,13 @@ class EvaluationOptions:
 
 
 @dataclass(frozen=True)
-class RegionScore:
-    """Disparity errors over one region of the pixels."""
-
-    bad: float
-    """Share of bad pixels, 0..1; NaN where the region has no pixels or the method no disparity."""
-    epe: float
-    """Mean |d - d*| in pixels, where there is an estimate."""
-    pixels: int
-    missing: int
-    """Those of the pixels for which the method gives no disparity: bad, and left out of the mean error."""
-
-
-@dataclass(frozen=True)
-class MethodScore:
-    """All measures of one method, over one frame or pooled over a set."""
-
-    regions: dict[str, RegionScore]
-    """By the names in `REGIONS`."""
-    gradient_masked: float
-    """Gradient error where the ground truth is smooth (the paper's Tables 1, 4, 5)."""
-    gradient_all: float
-    """Gradient error over every pixel, discontinuities included."""
-    seconds: float
-    """Mean wall-clock time a frame: of the networks for what they predict, else of the method by itself, on top
-    of what it is given."""
-
-
-@dataclass(frozen=True)
 class FrameScore:
     """Everything measured on one frame."""
 
     name: str
-    methods: dict[str, MethodScore]
+    scene: str
+    """Frames of one scene are resampled together."""
+    pools: dict[str, MethodPool]
     """By method name; without the methods that could not run."""
     initial_bad: float
     """Bad rate of the initial disparity: the area under the curve of a random order."""
@@ -97,6 +59,11 @@ class FrameScore:
     curves: dict[str, SparsificationCurve]
     """Sparsification of the initial disparity by each confidence measure: "confnet" and the frame's
     others."""
+
+    @cached_property
+    def methods(self) -> dict[str, MethodScore]:
+        """The measures of each method on this frame."""
+        return {name: pool.score() for name, pool in self.pools.items()}
 
     @property
     def aucs(self) -> dict[str, float]:
@@ -175,7 +142,7 @@ class _Run:
         self.methods = methods
         self.options = options
         self.skipped: dict[str, str] = {}
-        self.pools: dict[str, _Pool] = {}
+        self.pools: dict[str, MethodPool] = {}
         self.scores: list[FrameScore] = []
         self.first: list[Panel] = []
         self.worst: list[tuple[float, int, Panel]] = []
@@ -184,21 +151,22 @@ class _Run:
         """Evaluate one frame."""
         if not self.scores:
             self._choose_methods(frame)
-        scores, disparities = {}, {}
+        pools, disparities = {}, {}
         for method in self.methods:
             if method.missing(frame):
                 lacking = " and no ".join(method.missing(frame))
                 raise ValueError(f"frame {frame.name} has no {lacking}; the first frame has")
             began = time.perf_counter()
             output = method.run(frame)
-            pool = _Pool(self.options)
+            pool = self._empty_pool()
             pool.add(frame, output, time.perf_counter() - began + output.seconds)
             self.pools[method.name].merge(pool)
-            scores[method.name] = pool.score()
+            pools[method.name] = pool
             if output.disparity is not None:
                 disparities[method.name] = output.disparity
-        self._keep(Panel(frame, disparities, order=len(self.scores)), scores[self.judged].regions["all"].epe)
-        self.scores.append(self._frame_score(frame, scores))
+        error = pools[self.judged].regions["all"].end_point_error
+        self._keep(Panel(frame, disparities, order=len(self.scores)), error)
+        self.scores.append(self._frame_score(frame, pools))
 
     def finish(self) -> Evaluation:
         """Pool the frames taken."""
@@ -225,8 +193,11 @@ class _Run:
         self.methods = tuple(method for method in self.methods if method.name not in self.skipped)
         if not self.methods:
             raise ValueError(f"no method can run: {'; '.join(self.skipped.values())}")
-        self.pools = {method.name: _Pool(self.options) for method in self.methods}
+        self.pools = {method.name: self._empty_pool() for method in self.methods}
         self.judged = "ours" if "ours" in self.pools else self.methods[0].name
+
+    def _empty_pool(self) -> MethodPool:
+        return MethodPool.empty(self.options.bad_threshold, self.options.gradient_threshold)
 
     def _keep(self, panel: Panel, error: float) -> None:
         """Keep the frame's arrays if it is among the first or, so far, among the worst."""
@@ -237,7 +208,7 @@ class _Run:
             if len(self.worst) > self.options.worst_panels:
                 heapq.heappop(self.worst)
 
-    def _frame_score(self, frame: EvaluationFrame, scores: dict[str, MethodScore]) -> FrameScore:
+    def _frame_score(self, frame: EvaluationFrame, pools: dict[str, MethodPool]) -> FrameScore:
         threshold = self.options.bad_threshold
         measures = dict(frame.other_confidences)
         if frame.confidence is not None:
@@ -249,58 +220,9 @@ class _Run:
         bad = bad_pixel_rate(frame.disparity, frame.truth, threshold)
         return FrameScore(
             name=frame.name,
-            methods=scores,
+            scene=frame.scene or frame.name,
+            pools=pools,
             initial_bad=bad,
             optimal_auc=optimal_auc(bad) if np.isfinite(bad) else float("nan"),
             curves=curves,
-        )
-
-
-@dataclass
-class _Pool:
-    """Running sums of one method."""
-
-    options: EvaluationOptions
-    regions: dict[str, ErrorPool] = field(default_factory=dict)
-    masked: GradientPool = field(default_factory=GradientPool)
-    everywhere: GradientPool = field(default_factory=GradientPool)
-    seconds: float = 0.0
-    frames: int = 0
-
-    def __post_init__(self) -> None:
-        self.regions = {name: ErrorPool(self.options.bad_threshold) for name in REGIONS}
-
-    def add(self, frame: EvaluationFrame, output: MethodOutput, seconds: float) -> None:
-        if output.disparity is not None:
-            self.regions["all"].add(output.disparity, frame.truth)
-            self.regions["occ"].add(output.disparity, frame.truth, frame.occlusion > 0)
-        if output.gradient is not None:
-            gradient = np.asarray(output.gradient, dtype=np.float64)
-        elif output.disparity is not None:
-            gradient = forward_gradient(output.disparity)
-        else:
-            raise ValueError("a method gave neither a disparity nor a gradient")
-        truth = forward_gradient(frame.truth)
-        self.masked.add(gradient, truth, smooth_mask(truth, self.options.gradient_threshold))
-        self.everywhere.add(gradient, truth)
-        self.seconds += seconds
-        self.frames += 1
-
-    def merge(self, other: _Pool) -> None:
-        for name, pool in other.regions.items():
-            self.regions[name].merge(pool)
-        self.masked.merge(other.masked)
-        self.everywhere.merge(other.everywhere)
-        self.seconds += other.seconds
-        self.frames += other.frames
-
-    def score(self) -> MethodScore:
-        return MethodScore(
-            regions={
-                name: RegionScore(pool.bad_pixel_rate, pool.end_point_error, pool.pixels, pool.missing)
-                for name, pool in self.regions.items()
-            },
-            gradient_masked=self.masked.gradient_error,
-            gradient_all=self.everywhere.gradient_error,
-            seconds=self.seconds / max(self.frames, 1),
         )

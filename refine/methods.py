@@ -42,6 +42,11 @@ class EvaluationFrame:
     """(H, W, 3), the right view of the pair."""
     fine_tuned: NDArray[np.float32] | None = None
     """(H, W) disparity of a regressor fine-tuned on gradients too (the paper's eq. 9)."""
+    objects: NDArray[np.uint16] | None = None
+    """(H, W): 0 background, anything else foreground (KITTI's object map)."""
+    scene: str = ""
+    """Frames of one scene are alike and are resampled together (`refine.bootstrap`); the frame's name if
+    empty."""
     other_confidences: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     """Further confidence measures to compare, by name: (H, W), higher is surer, any scale."""
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -62,6 +67,8 @@ class EvaluationFrame:
             shapes["right"] = (self.right.shape, (*size, 3))
         if self.fine_tuned is not None:
             shapes["fine_tuned"] = (self.fine_tuned.shape, size)
+        if self.objects is not None:
+            shapes["objects"] = (self.objects.shape, size)
         for name, values in self.other_confidences.items():
             shapes[f"confidence {name!r}"] = (values.shape, size)
         for name, (got, expected) in shapes.items():

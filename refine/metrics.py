@@ -219,18 +219,42 @@ def kitti_d1(disparity: ArrayLike, truth: ArrayLike, object_map: ArrayLike | Non
         disparity, truth: As for `end_point_error`.
         object_map: (H, W), 0 background, anything else foreground; all background if None.
     """
-    values = np.asarray(truth, dtype=np.float64)
-    where = _counted(disparity, truth, None)
-    error = np.abs(np.asarray(disparity, dtype=np.float64) - values)
-    outlier = ~((error <= 3) | (error <= 0.05 * np.abs(values)))
-    foreground = np.zeros(values.shape, bool) if object_map is None else np.asarray(object_map) != 0
-    if foreground.shape != values.shape:
-        raise ValueError(f"the object map has shape {foreground.shape}, the disparity {values.shape}")
+    return D1Pool().add(disparity, truth, object_map).rates
 
-    def rate(mask: Mask) -> float:
-        return float(outlier[mask].mean()) if mask.any() else float("nan")
 
-    return KittiD1(rate(where & ~foreground), rate(where & foreground), rate(where))
+@dataclass
+class D1Pool:
+    """Outliers of KITTI 2015 counted over any number of images, background and foreground apart."""
+
+    pixels: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, np.int64))
+    """[background, foreground] with ground truth."""
+    outliers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, np.int64))
+
+    def add(self, disparity: ArrayLike, truth: ArrayLike, object_map: ArrayLike | None = None) -> Self:
+        """Take in one image (arguments as for `kitti_d1`)."""
+        values = np.asarray(truth, dtype=np.float64)
+        where = _counted(disparity, truth, None)
+        error = np.abs(np.asarray(disparity, dtype=np.float64) - values)
+        outlier = ~((error <= 3) | (error <= 0.05 * np.abs(values)))
+        foreground = np.zeros(values.shape, bool) if object_map is None else np.asarray(object_map) != 0
+        if foreground.shape != values.shape:
+            raise ValueError(f"the object map has shape {foreground.shape}, the disparity {values.shape}")
+        classes = (where & ~foreground, where & foreground)
+        self.pixels = self.pixels + [mask.sum() for mask in classes]
+        self.outliers = self.outliers + [outlier[mask].sum() for mask in classes]
+        return self
+
+    def merge(self, other: D1Pool) -> None:
+        """Take in what another pool has counted."""
+        self.pixels = self.pixels + other.pixels
+        self.outliers = self.outliers + other.outliers
+
+    @property
+    def rates(self) -> KittiD1:
+        counted = np.append(self.pixels, self.pixels.sum())
+        wrong = np.append(self.outliers, self.outliers.sum())
+        background, foreground, everything = np.where(counted > 0, wrong / np.maximum(counted, 1), np.nan)
+        return KittiD1(float(background), float(foreground), float(everything))
 
 
 def _errors(disparity: ArrayLike, truth: ArrayLike, mask: ArrayLike | None) -> Floats:

@@ -1,25 +1,51 @@
-"""The report of an evaluation: one self-contained HTML file, and the same numbers as CSV and JSON."""
+"""The report of evaluations: one self-contained HTML file, and the same numbers and figures as files."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from markupsafe import Markup
+
+from refine.bootstrap import LEVEL, Bootstrap, bootstrap
 from refine.evaluation import Evaluation
-from refine.report_figures import auc_figure, curve_figure, panel_view
+from refine.paper_tables import PaperTable, paper_tables
+from refine.report_figures import (
+    PanelView,
+    auc_figure,
+    curve_figure,
+    lens_picture,
+    panel_picture,
+    panel_view,
+)
 from refine.report_tables import (
+    Table,
+    Tile,
     confidence_table,
     error_table,
     frame_table,
     missing_notes,
-    ratio_tables,
+    overview_table,
     summary_tiles,
 )
-from refine.results import mean_curves, results_csv, results_json
-from storage import write_text
+from refine.results import EvaluatedSet, mean_curves, results_csv, results_json
+from refine.table_files import (
+    caption,
+    printed,
+    printed_interval,
+    printed_ratio,
+    tables_csv,
+    tables_json,
+    tables_latex,
+    tables_markdown,
+)
+from storage import write_bytes, write_text
 from viewing import render_page
-from viewing.plots import svg
+from viewing.html import encoded
+from viewing.plots import hoverable, svg_file
 
 
 @dataclass(frozen=True)
@@ -30,9 +56,10 @@ class ReportContext:
     lead: str = ""
     """One or two sentences under the title."""
     facts: Mapping[str, str] = field(default_factory=dict)
-    """Where it all comes from, for example {"Test data": "...", "Weights": "...", "Command": "..."}."""
+    """Where it all comes from, for example {"Weights": "...", "Command": "..."}."""
     limits: tuple[str, ...] = ()
     """Honest sentences a reader must know before believing a number: budget, sizes, what is missing."""
+    bootstrap_seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -42,47 +69,106 @@ class ReportFiles:
     html: Path
     csv: Path
     json: Path
+    figures: Path
+    """Folder of the figures, a folder a set: `fig1-N.png`, `fig4.svg`, `fig4-mean.svg`, `fig5.svg`, `fig6-N.png`;
+    in KITTI's style 7 and 8 for 5 and 6."""
+
+
+@dataclass(frozen=True)
+class SetView:
+    """One data set's part of the page."""
+
+    id: str
+    name: str
+    evaluation: Evaluation
+    facts: Mapping[str, str]
+    intervals: Bootstrap
+    tiles: list[Tile]
+    tables: tuple[PaperTable, ...]
+    errors: Table
+    missing: list[str]
+    confidences: Table
+    frames: Table
+    curve_plots: tuple[Markup, ...]
+    auc_plot: Markup | None
+    panels: list[PanelView]
+    worst: list[PanelView]
+    worst_shown_above: list[str]
+    kitti: bool
 
 
 def write_report(
-    evaluation: Evaluation,
+    sets: Sequence[EvaluatedSet],
     out: Path,
     context: ReportContext = ReportContext(),
 ) -> ReportFiles:
-    """Write `report.html`, `results.csv` and `results.json` into the folder `out`, made if missing.
+    """Write the report of one or more sets into the folder `out`, made if missing.
 
-    Each file is replaced in one step: a reader never meets half of one.
+    `report.html`; every number in `results.csv` and `results.json`; the paper's tables in `tables.csv`, `.json`,
+    `.md` and `.tex`; the figures in `figures/`. Each file is replaced in one step: a reader never meets half of
+    one.
+
+    Raises:
+        ValueError: If there is no set, or two share a name.
     """
-    files = ReportFiles(out / "report.html", out / "results.csv", out / "results.json")
+    if not sets or len({each.name for each in sets}) != len(sets):
+        raise ValueError("a report needs at least one set, and no two of one name")
+    files = ReportFiles(out / "report.html", out / "results.csv", out / "results.json", out / "figures")
     about = {"title": context.title, **context.facts, "limits": list(context.limits)}
-    write_text(files.csv, results_csv(evaluation))
-    write_text(files.json, results_json(evaluation, about))
-    write_text(files.html, report_html(evaluation, context))
+    views = [_set_view(each, index, context.bootstrap_seed) for index, each in enumerate(sets)]
+    tables = {view.name: view.tables for view in views}
+    write_text(files.csv, results_csv(sets))
+    write_text(files.json, results_json(sets, about))
+    write_text(out / "tables.csv", tables_csv(tables))
+    write_text(out / "tables.json", tables_json(tables))
+    write_text(out / "tables.md", tables_markdown(tables))
+    write_text(out / "tables.tex", tables_latex(tables))
+    for view in views:
+        for name, content in _figure_files(view):
+            write_bytes(files.figures / folder_name(view.name) / name, content)
+    write_text(files.html, _page(sets, views, context))
     return files
 
 
-def report_html(evaluation: Evaluation, context: ReportContext) -> str:
-    """The page as text."""
-    first = evaluation.frames[0]
-    shown = {panel.order for panel in evaluation.first}
+def folder_name(name: str) -> str:
+    """A set's name as a file system takes it."""
+    return re.sub(r"[^\w.-]+", "-", name).strip("-.") or "set"
+
+
+def _page(sets: Sequence[EvaluatedSet], views: list[SetView], context: ReportContext) -> str:
     return render_page(
         "refine",
         "report.html",
         title=context.title,
         context=context,
+        views=views,
+        overview=overview_table(sets, [view.intervals for view in views]) if len(views) > 1 else None,
+        level=f"{LEVEL:.0%}".replace("%", " %"),
+        caption=caption,
+        printed=printed,
+        printed_interval=printed_interval,
+        printed_ratio=printed_ratio,
+    )
+
+
+def _set_view(each: EvaluatedSet, index: int, seed: int) -> SetView:
+    evaluation = each.evaluation
+    intervals = bootstrap(evaluation, seed=seed)
+    shown = {panel.order for panel in evaluation.first}
+    return SetView(
+        id=f"set-{index + 1}",
+        name=each.name,
         evaluation=evaluation,
-        threshold=f"{evaluation.options.bad_threshold:g}",
+        facts=each.facts,
+        intervals=intervals,
         tiles=summary_tiles(evaluation),
+        tables=paper_tables(each, intervals),
         errors=error_table(evaluation),
         missing=missing_notes(evaluation),
-        ratios=ratio_tables(evaluation),
         confidences=confidence_table(evaluation),
-        frame_rows=frame_table(evaluation),
-        first_curves=svg(curve_figure(first.curves, first.initial_bad, f"First frame, {first.name}")),
-        mean_curves=svg(
-            curve_figure(mean_curves(evaluation), None, f"Mean of {len(evaluation.frames)} frames")
-        ),
-        auc_plot=svg(auc_figure(evaluation.frames)) if len(evaluation.frames) > 1 else "",
+        frames=frame_table(evaluation),
+        curve_plots=tuple(hoverable(figure) for _, figure in _curve_figures(evaluation)),
+        auc_plot=hoverable(auc_figure(evaluation.frames)) if len(evaluation.frames) > 1 else None,
         panels=[panel_view(evaluation, panel) for panel in evaluation.first],
         worst=[
             panel_view(evaluation, panel, failure=True)
@@ -90,4 +176,25 @@ def report_html(evaluation: Evaluation, context: ReportContext) -> str:
             if panel.order not in shown
         ],
         worst_shown_above=[panel.frame.name for panel in evaluation.worst if panel.order in shown],
+        kitti=each.is_kitti,
     )
+
+
+def _curve_figures(evaluation: Evaluation) -> Iterator[tuple[str, Any]]:
+    first = evaluation.frames[0]
+    yield "fig4.svg", curve_figure(first.curves, first.initial_bad, f"First frame, {first.name}")
+    mean = mean_curves(evaluation)
+    yield "fig4-mean.svg", curve_figure(mean, None, f"Mean of {len(evaluation.frames)} frames")
+
+
+def _figure_files(view: SetView) -> Iterator[tuple[str, bytes]]:
+    """Each figure of a set: its file's name and content."""
+    for name, figure in _curve_figures(view.evaluation):
+        yield name, svg_file(figure).encode()
+    if view.auc_plot is not None:
+        yield "fig7.svg" if view.kitti else "fig5.svg", svg_file(auc_figure(view.evaluation.frames)).encode()
+    panels = "fig8" if view.kitti else "fig6"
+    for number, panel in enumerate((*view.panels, *view.worst), start=1):
+        yield f"{panels}-{number}.png", encoded(panel_picture(panel))
+        if panel.lens is not None:
+            yield f"fig1-{number}.png", encoded(lens_picture(panel.lens))

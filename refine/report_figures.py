@@ -22,6 +22,8 @@ from viewing import (
     enlarged,
     error_picture,
     shrunk,
+    side_by_side,
+    stacked,
 )
 from viewing.plots import curves
 
@@ -96,6 +98,21 @@ def panel_view(evaluation: Evaluation, panel: Panel, failure: bool = False) -> P
         refined_label=label,
         lens=_lens(panel, refined, failure),
     )
+
+
+def panel_picture(view: PanelView) -> Picture:
+    """A panel's pictures in one, three a row, as the paper's Fig. 6 has them: image, initial disparity, initial
+    error; confidence, refined disparity, refined error."""
+    pictures = [picture for picture, _ in view.pictures]
+    if len(pictures) % 3:  # without a confidence
+        pictures.insert(3, np.full_like(pictures[0], 255))
+    rows = [side_by_side(pictures[start : start + 3]) for start in range(0, len(pictures), 3)]
+    return stacked(rows)
+
+
+def lens_picture(lens: Lens) -> Picture:
+    """A close-up's pictures side by side, as the paper's Fig. 1: image, initial, refined, ground truth."""
+    return side_by_side([lens.image, lens.initial, lens.refined, lens.truth])
 
 
 def curve_figure(measured: Mapping[str, SparsificationCurve], bad_rate: float | None, title: str) -> Figure:

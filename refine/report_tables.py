@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from refine.evaluation import Evaluation, FrameScore, MethodScore
-from refine.paper import PAPER, PaperScore
-from refine.results import mean_aucs
+from refine.bootstrap import REFERENCE, Bootstrap
+from refine.evaluation import Evaluation, FrameScore
+from refine.paper import PAPER, counterpart
+from refine.pooling import MethodScore
+from refine.results import EvaluatedSet, mean_aucs
 
 CONFIDENCE_LABELS = {
     "confnet": "ConfNet",
     "rdf": "Random forest",
+    "lrc": "Left-right consistency",
     "random": "Random order",
     "optimal": "Optimal order",
 }
@@ -54,25 +58,20 @@ def percent(value: float, best: bool = False) -> Cell:
     return number(value, digits=2, scale=100, best=best)
 
 
-def flat(score: MethodScore) -> PaperScore:
-    """A method's pooled measures in the paper's terms."""
-    everything, occluded = score.regions["all"], score.regions["occ"]
-    return PaperScore(everything.bad, everything.epe, occluded.bad, occluded.epe, score.gradient_masked)
-
-
 def summary_tiles(evaluation: Evaluation) -> list[Tile]:
     """The headline: what refinement changed, and how good the confidence is."""
     tiles = []
     start, end = evaluation.scores.get("regressor"), evaluation.scores.get("ours")
     if start is not None and end is not None:
-        before, after = flat(start), flat(end)
+        before, after = start.measures(), end.measures()
         threshold = f"{evaluation.options.bad_threshold:g}"
-        for label, old, new, scale, unit in (
-            ("end-point error, px", before.epe_all, after.epe_all, 1, ""),
-            (f"pixels off by more than {threshold} px", before.bad_all, after.bad_all, 100, " %"),
-            ("the same where occluded", before.bad_occ, after.bad_occ, 100, " %"),
-            ("gradient error", before.gradient, after.gradient, 1, ""),
+        for label, measure, scale, unit in (
+            ("end-point error, px", "epe_all", 1, ""),
+            (f"pixels off by more than {threshold} px", "bad_all", 100, " %"),
+            ("the same where occluded", "bad_occ", 100, " %"),
+            ("gradient error", "gradient_masked", 1, ""),
         ):
+            old, new = before[measure], after[measure]
             if not math.isnan(old):
                 digits = 1 if scale == 100 else 2
                 tiles.append(Tile(f"{old * scale:.{digits}f} → {new * scale:.{digits}f}{unit}", label))
@@ -83,6 +82,48 @@ def summary_tiles(evaluation: Evaluation) -> list[Tile]:
             Tile(f"{share * 100:.0f} %", "of the way from a random to the optimal order: ConfNet's AUC")
         )
     return tiles
+
+
+def overview_table(sets: Sequence[EvaluatedSet], intervals: Sequence[Bootstrap]) -> Table | None:
+    """One row a set: the errors before and after, the ratio with its interval, and the paper's ratio."""
+    rows = []
+    for each, known in zip(sets, intervals, strict=True):
+        scores = each.evaluation.scores
+        if REFERENCE not in scores or "ours" not in scores:
+            continue
+        before, after = scores[REFERENCE].measures(), scores["ours"].measures()
+        beside = counterpart(each.family, each.split, 2)
+        cells: list[Cell] = []
+        for measure, digits, scale in (("epe_all", 2, 1), ("bad_all", 1, 100), ("gradient_masked", 3, 1)):
+            interval = known.ratios["ours"][measure]
+            ratio = after[measure] / before[measure] if before[measure] else math.nan
+            paper = math.nan
+            if beside is not None:
+                printed = PAPER[beside]
+                paper = printed["ours"].value(measure) / printed[REFERENCE].value(measure)
+            arrow = f"{before[measure] * scale:.{digits}f} → {after[measure] * scale:.{digits}f}"
+            range_ = "" if math.isnan(interval.low) else f" ({interval.low:.2f}–{interval.high:.2f})"
+            cells += [
+                Cell(arrow, repr(after[measure])),
+                Cell(f"{ratio:.2f}{range_}", repr(ratio)),
+                number(paper),
+            ]
+        rows.append((each.name, tuple(cells)))
+    if not rows:
+        return None
+    headings = (
+        "Data set",
+        "EPE, px",
+        "ratio",
+        "paper's",
+        "> 1 px, %",
+        "ratio",
+        "paper's",
+        "gradient",
+        "ratio",
+        "paper's",
+    )
+    return Table(headings, tuple(rows))
 
 
 def error_table(evaluation: Evaluation) -> Table:
@@ -133,28 +174,6 @@ def missing_notes(evaluation: Evaluation) -> list[str]:
     return notes
 
 
-def ratio_tables(evaluation: Evaluation) -> list[tuple[str, Table]]:
-    """For each method that both have, its errors divided by the regressor's, here and in the paper; ours
-    first."""
-    here = {name: flat(score) for name, score in evaluation.scores.items()}
-    if "regressor" not in here:
-        return []
-    headings = ("Measured on", "bad, all", "EPE, all", "bad, occ.", "EPE, occ.", "gradient, smooth")
-    tables = []
-    for method in sorted(
-        here.keys() - {"regressor"}, key=lambda name: (name != "ours", list(here).index(name))
-    ):
-        rows = [
-            (f"paper, {name}", _ratios(scores[method], scores["regressor"]))
-            for name, scores in PAPER.items()
-            if method in scores
-        ]
-        if rows:
-            rows.insert(0, ("here", _ratios(here[method], here["regressor"])))
-            tables.append((evaluation.labels[method], Table(headings, tuple(rows))))
-    return tables
-
-
 def confidence_table(evaluation: Evaluation) -> Table:
     """Mean area under the sparsification curve, and on how many frames each measure beats ConfNet."""
     aucs = mean_aucs(evaluation)
@@ -162,8 +181,18 @@ def confidence_table(evaluation: Evaluation) -> Table:
     rows = []
     for name, auc in sorted(aucs.items(), key=lambda item: item[1]):
         share = (aucs["random"] - auc) / room if room > 0 else math.nan
-        rows.append((CONFIDENCE_LABELS.get(name, name), (number(auc, 4), number(share, 1, scale=100))))
-    return Table(("Order of removal", "mean AUC", "of random → optimal, %"), tuple(rows))
+        lost = [
+            frame.aucs["confnet"] < frame.aucs[name]
+            for frame in evaluation.frames
+            if {"confnet", name} <= frame.aucs.keys()
+        ]
+        beaten = sum(lost) / len(lost) if lost and name not in ("confnet", *BOUNDS) else math.nan
+        cells = (number(auc, 4), number(share, 1, scale=100), number(beaten, 0, scale=100))
+        rows.append((CONFIDENCE_LABELS.get(name, name), cells))
+    return Table(
+        ("Order of removal", "mean AUC", "of random → optimal, %", "frames where ConfNet is better, %"),
+        tuple(rows),
+    )
 
 
 def frame_table(evaluation: Evaluation) -> Table:
@@ -197,23 +226,8 @@ def _frame_cells(evaluation: Evaluation, frame: FrameScore) -> tuple[Cell, ...]:
 
 
 def _error_values(score: MethodScore) -> tuple[float, ...]:
-    values = flat(score)
-    return (
-        values.bad_all,
-        values.epe_all,
-        values.bad_occ,
-        values.epe_occ,
-        score.gradient_masked,
-        score.gradient_all,
+    measures = score.measures()
+    return tuple(
+        measures[name]
+        for name in ("bad_all", "epe_all", "bad_occ", "epe_occ", "gradient_masked", "gradient_all")
     )
-
-
-def _ratios(score: PaperScore, reference: PaperScore) -> tuple[Cell, ...]:
-    pairs = (
-        (score.bad_all, reference.bad_all),
-        (score.epe_all, reference.epe_all),
-        (score.bad_occ, reference.bad_occ),
-        (score.epe_occ, reference.epe_occ),
-        (score.gradient, reference.gradient),
-    )
-    return tuple(number(value / base if base else math.nan) for value, base in pairs)

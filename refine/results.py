@@ -1,5 +1,4 @@
-"""An evaluation's numbers as plain rows: the one source of the report's tables, `results.csv` and
-`results.json`."""
+"""Evaluations' numbers as plain rows: the one source of the report's tables, `results.csv` and `results.json`."""
 
 from __future__ import annotations
 
@@ -7,24 +6,38 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
-from refine.evaluation import REGIONS, Evaluation, MethodScore
+from refine.evaluation import Evaluation
 from refine.metrics import SparsificationCurve, optimal_curve
+from refine.pooling import MEASURES
 
-MEASURES = (
-    *(f"{measure}_{region}" for region in REGIONS for measure in ("bad", "epe", "pixels", "missing")),
-    "gradient_masked",
-    "gradient_all",
-    "seconds",
-    "auc",
-)
-"""Columns of numbers. bad: share 0..1; epe: pixels; pixels, missing: counts; gradient: pixels a pixel;
-seconds: a frame; auc: 0..1."""
+COLUMNS = (*MEASURES, "auc")
+"""A method's measures, and a confidence measure's mean area under the sparsification curve (0..1)."""
+
+
+@dataclass(frozen=True)
+class EvaluatedSet:
+    """One data set's evaluation, with what it is."""
+
+    name: str
+    """For readers; no two sets of a report share one."""
+    evaluation: Evaluation
+    family: str = ""
+    """What kind of world, to find the paper's counterpart (`refine.paper.counterpart`); empty if unknown."""
+    split: str = "test"
+    facts: Mapping[str, str] = field(default_factory=dict)
+    """Where it comes from, for example {"Folder": "..."}."""
+
+    @property
+    def is_kitti(self) -> bool:
+        """Whether it is in KITTI's style, with cars told from the rest."""
+        pools = (pool for frame in self.evaluation.frames for pool in frame.pools.values())
+        return self.family.startswith("kitti") or any(pool.d1.pixels[1] > 0 for pool in pools)
 
 
 @dataclass(frozen=True)
@@ -39,18 +52,18 @@ class ResultRow:
     """"method" or "confidence"."""
     name: str
     values: Mapping[str, float]
-    """Some of `MEASURES`; NaN where a mask had no pixels."""
+    """Some of `COLUMNS`; NaN where a mask had no pixels."""
 
 
 def result_rows(evaluation: Evaluation) -> Iterator[ResultRow]:
     """Every number of an evaluation, the whole set first, then frame by frame in the order they came."""
     for name, score in evaluation.scores.items():
-        yield ResultRow(None, "", "method", name, _method_values(score))
+        yield ResultRow(None, "", "method", name, score.measures())
     for name, auc in mean_aucs(evaluation).items():
         yield ResultRow(None, "", "confidence", name, {"auc": auc})
     for order, frame in enumerate(evaluation.frames):
         for name, score in frame.methods.items():
-            yield ResultRow(order, frame.name, "method", name, _method_values(score))
+            yield ResultRow(order, frame.name, "method", name, score.measures())
         for name, auc in frame.aucs.items():
             yield ResultRow(order, frame.name, "confidence", name, {"auc": auc})
 
@@ -81,46 +94,49 @@ def mean_curves(evaluation: Evaluation) -> dict[str, SparsificationCurve]:
     }
 
 
-def results_csv(evaluation: Evaluation) -> str:
+def results_csv(sets: Sequence[EvaluatedSet]) -> str:
     """One line a row, full precision, empty cells where a row has no such measure or it is NaN."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(["frame", "kind", "name", *MEASURES])
-    for row in result_rows(evaluation):
-        cells = [row.values.get(measure, math.nan) for measure in MEASURES]
-        numbers = ["" if math.isnan(cell) else repr(cell) for cell in cells]
-        writer.writerow([row.frame, row.kind, row.name, *numbers])
+    writer.writerow(["set", "frame", "kind", "name", *COLUMNS])
+    for each in sets:
+        for row in result_rows(each.evaluation):
+            cells = [row.values.get(measure, math.nan) for measure in COLUMNS]
+            numbers = ["" if math.isnan(cell) else repr(cell) for cell in cells]
+            writer.writerow([each.name, row.frame, row.kind, row.name, *numbers])
     return buffer.getvalue()
 
 
-def results_json(evaluation: Evaluation, about: Mapping[str, Any]) -> str:
+def results_json(sets: Sequence[EvaluatedSet], about: Mapping[str, Any]) -> str:
     """The same rows as nested objects, NaN as null, with the options and what `about` says of their
     origin."""
-    document: dict[str, Any] = {
-        "about": dict(about),
-        "options": asdict(evaluation.options),
-        "skipped": evaluation.skipped,
-        "set": {"methods": {}, "confidences": {}},
-        # A list: frames of two data sets may share a name.
-        "frames": [{"name": frame.name, "methods": {}, "confidences": {}} for frame in evaluation.frames],
-    }
-    for row in result_rows(evaluation):
-        place = document["set"] if row.order is None else document["frames"][row.order]
-        numbers = {key: None if math.isnan(value) else value for key, value in row.values.items()}
-        place[f"{row.kind}s"][row.name] = numbers
+    document = {"about": dict(about), "sets": [_set_document(each) for each in sets]}
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
-def _method_values(score: MethodScore) -> dict[str, float]:
-    values: dict[str, float] = {}
-    for name, region in score.regions.items():
-        for measure, value in asdict(region).items():
-            values[f"{measure}_{name}"] = value
-    return values | {
-        "gradient_masked": score.gradient_masked,
-        "gradient_all": score.gradient_all,
-        "seconds": score.seconds,
+def null_nan(value: float) -> float | None:
+    """JSON has no NaN."""
+    return None if math.isnan(value) else value
+
+
+def _set_document(each: EvaluatedSet) -> dict[str, Any]:
+    evaluation = each.evaluation
+    document: dict[str, Any] = {
+        "name": each.name,
+        "family": each.family,
+        "split": each.split,
+        "facts": dict(each.facts),
+        "options": asdict(evaluation.options),
+        "skipped": evaluation.skipped,
+        "methods": {},
+        "confidences": {},
+        # A list: two frames may share a name.
+        "frames": [{"name": frame.name, "methods": {}, "confidences": {}} for frame in evaluation.frames],
     }
+    for row in result_rows(evaluation):
+        place = document if row.order is None else document["frames"][row.order]
+        place[f"{row.kind}s"][row.name] = {key: null_nan(value) for key, value in row.values.items()}
+    return document
 
 
 def _mean(values: list[float]) -> float:

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -69,6 +71,42 @@ def svg(figure: Figure) -> str:
     digest = hashlib.sha256(text.encode()).hexdigest()[:8]
     text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>p{digest}-", text)
     return text.replace(_INK, "currentColor").strip()
+
+
+def svg_file(figure: Figure) -> str:
+    """The figure as the text of an SVG file of its own: black on nothing."""
+    buffer = io.StringIO()
+    with rc_context(STYLE):
+        figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    return buffer.getvalue().replace(_INK, "#000000")
+
+
+def hoverable(figure: Figure) -> Markup:
+    """The figure as `svg`, in an element that tells the page's script its curves, so that a pointer over it
+    reads their values. Without the script, and on paper, it is the plot."""
+    drawn = svg(figure)  # laid out now: the axes are where they will be
+    axes = figure.axes[0]
+    left, bottom, width, height = axes.get_position().bounds
+    facts = {
+        "box": [round(value, 5) for value in (left, 1 - bottom - height, width, height)],
+        "x": [float(value) for value in axes.get_xlim()],
+        "y": [float(value) for value in axes.get_ylim()],
+        "x_label": axes.get_xlabel(),
+        "curves": [
+            {
+                "name": str(line.get_label()),
+                "x": _significant(line.get_xdata()),
+                "y": _significant(line.get_ydata()),
+            }
+            for line in axes.lines
+        ],
+    }
+    return Markup('<div class="plot" data-plot="{}">{}</div>').format(json.dumps(facts), Markup(drawn))
+
+
+def _significant(values: ArrayLike) -> list[float | None]:
+    """Numbers short enough for a page; null for NaN."""
+    return [None if value != value else float(f"{value:.5g}") for value in np.asarray(values, np.float64)]
 
 
 def pixels(figure: Figure, dots_per_inch: float = 110.0) -> Picture:

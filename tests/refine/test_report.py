@@ -16,6 +16,7 @@ from refine.lens import most_improved_boundary, worst_boundary
 from refine.methods import default_methods
 from refine.overview import overview_picture
 from refine.report import ReportContext, write_report
+from refine.results import EvaluatedSet
 from tests.refine.worlds import toy_frame
 
 MAIN_ROWS = default_methods(("regressor", "gradnet", "ours", "ours_conf_gt"))
@@ -83,7 +84,8 @@ def written(evaluation, tmp_path_factory):
         facts={"Weights": "none & nothing", "Data": "toys"},
         limits=("These are toys.",),
     )
-    return write_report(evaluation, tmp_path_factory.mktemp("report") / "deep" / "out", context)
+    sets = [EvaluatedSet("toys", evaluation, "flying_things")]
+    return write_report(sets, tmp_path_factory.mktemp("report") / "deep" / "out", context)
 
 
 @pytest.fixture(scope="module")
@@ -113,57 +115,55 @@ def test_what_the_context_says_is_on_the_page_and_escaped(written, page):
 def test_csv_json_and_page_hold_the_same_numbers(evaluation, written, page):
     rows = list(csv.DictReader(written.csv.read_text().splitlines()))
     document = json.loads(written.json.read_text())
-    frames = {frame["name"]: frame for frame in document["frames"]}
+    (whole,) = document["sets"]
+    frames = {frame["name"]: frame for frame in whole["frames"]}
     assert len(rows) == 4 + 4 + 6 * (4 + 3) + 1
     for row in rows:
-        place = frames[row["frame"]] if row["frame"] else document["set"]
+        place = frames[row["frame"]] if row["frame"] else whole
         numbers = place[f"{row['kind']}s"][row["name"]]
         for measure, value in row.items():
-            if measure not in ("frame", "kind", "name"):
+            if measure not in ("set", "frame", "kind", "name"):
                 expected = numbers.get(measure)
                 assert value == "" if expected is None else float(value) == expected
     pooled = {row["name"]: row for row in rows if not row["frame"] and row["kind"] == "method"}
     columns = ("bad_all", "epe_all", "bad_occ", "epe_occ", "gradient_masked", "gradient_all", "seconds")
-    shown = {row[0]: row[1:] for row in page.tables["table-errors"][1:]}
+    shown = {row[0]: row[1:] for row in page.tables["set-1-errors"][1:]}
     for name, label in evaluation.labels.items():
         assert shown[label] == [pooled[name][column] for column in columns]
     assert float(pooled["ours"]["bad_all"]) == evaluation.scores["ours"].regions["all"].bad
-    assert document["set"]["methods"]["gradnet"]["bad_all"] is None
+    assert whole["methods"]["gradnet"]["bad_all"] is None
     assert document["about"]["limits"] == ["These are toys."]
     mean_auc = np.mean([frame.aucs["confnet"] for frame in evaluation.frames])
-    assert document["set"]["confidences"]["confnet"]["auc"] == pytest.approx(mean_auc)
+    assert whole["confidences"]["confnet"]["auc"] == pytest.approx(mean_auc)
 
 
 def test_frames_that_share_a_name_keep_their_own_numbers(tmp_path):
     frames = [toy_frame(seed) for seed in (0, 1)]
     evaluation = evaluate([frames[0], replace(frames[1], name=frames[0].name)], MAIN_ROWS)
-    document = json.loads(write_report(evaluation, tmp_path).json.read_text())
-    errors = [frame["methods"]["ours"]["epe_all"] for frame in document["frames"]]
+    document = json.loads(write_report([EvaluatedSet("toys", evaluation)], tmp_path).json.read_text())
+    errors = [frame["methods"]["ours"]["epe_all"] for frame in document["sets"][0]["frames"]]
     assert errors == [frame.methods["ours"].regions["all"].epe for frame in evaluation.frames]
     assert errors[0] != errors[1]
 
 
-def test_ratios_stand_beside_the_papers(evaluation, page):
-    rows = {row[0]: row[1:] for row in page.tables["table-ratios-1"][1:]}
-    start, end = evaluation.scores["regressor"], evaluation.scores["ours"]
-    assert float(rows["here"][1]) == pytest.approx(end.regions["all"].epe / start.regions["all"].epe)
-    assert float(rows["paper, FlyingThings3D test"][0]) == pytest.approx(21.17 / 23.48)
-    assert float(rows["paper, Sintel"][4]) == pytest.approx(0.32 / 0.45)
-
-
 def test_frames_are_listed_and_failures_shown(evaluation, page):
-    assert len(page.tables["table-frames"]) == 1 + 6
+    assert len(page.tables["set-1-frames"]) == 1 + 6
     for panel in (*evaluation.first, *evaluation.worst):
         assert panel.frame.name in page.text
 
 
 def test_writing_again_replaces_and_leaves_no_litter(evaluation, written):
     before = written.json.read_text()
-    write_report(evaluation, written.html.parent, ReportContext(title="Second"))
+    write_report([EvaluatedSet("toys", evaluation)], written.html.parent, ReportContext(title="Second"))
     assert {path.name for path in written.html.parent.iterdir()} == {
         "report.html",
         "results.csv",
         "results.json",
+        "tables.csv",
+        "tables.json",
+        "tables.md",
+        "tables.tex",
+        "figures",
     }
     assert json.loads(written.json.read_text())["about"]["title"] == "Second"
     assert before != written.json.read_text()
@@ -172,7 +172,7 @@ def test_writing_again_replaces_and_leaves_no_litter(evaluation, written):
 def test_a_report_of_one_frame_without_networks(tmp_path):
     frame = replace(toy_frame(0), confidence=None, gradient=None, truth=np.full((48, 80), 8.0, np.float32))
     frame.disparity[:12] = np.nan
-    files = write_report(evaluate([frame], MAIN_ROWS), tmp_path)
+    files = write_report([EvaluatedSet("one", evaluate([frame], MAIN_ROWS))], tmp_path)
     parser = Page()
     parser.feed(files.html.read_text())
     assert parser.open == []

@@ -45,3 +45,40 @@ for (const figure of document.querySelectorAll("figure.blink")) {
   });
   figure.querySelector(".blink-stage").addEventListener("click", () => figure.classList.toggle("second"));
 }
+// Plots: a pointer (or a finger) over one reads every curve at that place.
+function nearestPoint(curve, x) {
+  let best = null;
+  for (let i = 0; i < curve.x.length; i++) {
+    if (curve.x[i] === null || curve.y[i] === null) continue;
+    if (best === null || Math.abs(curve.x[i] - x) < Math.abs(curve.x[best] - x)) best = i;
+  }
+  return best;
+}
+function plotReader(plot) {
+  const facts = JSON.parse(plot.dataset.plot);
+  const [left, top, width, height] = facts.box;
+  const drawing = plot.querySelector("svg");
+  const line = Object.assign(document.createElement("span"), { className: "plot-line" });
+  const note = Object.assign(document.createElement("div"), { className: "plot-note" });
+  plot.append(line, note);
+  plot.addEventListener("pointerleave", () => plot.classList.remove("reading"));
+  plot.addEventListener("pointermove", event => {
+    const frame = drawing.getBoundingClientRect(), home = plot.getBoundingClientRect();
+    const share = ((event.clientX - frame.left) / frame.width - left) / width;
+    if (share < 0 || share > 1) { plot.classList.remove("reading"); return; }
+    const x = facts.x[0] + share * (facts.x[1] - facts.x[0]);
+    const rows = facts.curves.map(curve => [curve, nearestPoint(curve, x)]).filter(([, i]) => i !== null);
+    if (rows.length === 0) return;
+    const at = rows[0][0].x[rows[0][1]];
+    note.replaceChildren(...[`${facts.x_label}: ${at}`, ...rows.map(([c, i]) => `${c.name}: ${c.y[i]}`)].map(text =>
+      Object.assign(document.createElement("div"), { textContent: text })));
+    const place = (at - facts.x[0]) / (facts.x[1] - facts.x[0]);
+    const offset = frame.left - home.left + plot.scrollLeft, across = offset + frame.width * (left + width * place);
+    Object.assign(line.style, { left: `${across}px`, top: `${frame.height * top}px`, height: `${frame.height * height}px` });
+    note.style.top = `${frame.height * top}px`;
+    note.style.left = place < 0.5 ? `${across + 8}px` : "auto";
+    note.style.right = place < 0.5 ? "auto" : `${home.width - across + 8}px`;
+    plot.classList.add("reading");
+  });
+}
+for (const plot of document.querySelectorAll(".plot[data-plot]")) plotReader(plot);
