@@ -112,6 +112,7 @@ def counterpart(family: str, split: str, table: int) -> str | None:
 
     Table 5 has the validation part of FlyingThings3D only. None where the paper has nothing alike.
     """
+    family = family.removesuffix("-final")
     if family in _FLYING:
         return "FlyingThings3D validation" if table == 5 or split == "val" else "FlyingThings3D test"
     return _COUNTERPARTS.get(family)

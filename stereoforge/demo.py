@@ -10,12 +10,12 @@ from pathlib import Path
 
 from rich.table import Table
 
-from datagen import Recipe, StereoDataset, render_dataset
+from datagen import Recipe, render_dataset
 from datagen.gallery import write_gallery
 from refine.evaluation import Evaluation
 from scenes.families.flying_things import FlyingThingsConfig
 from stereoforge.errors import CommandError
-from stereoforge.evaluation import evaluate_datasets, report_evaluation
+from stereoforge.evaluation import evaluate_set, open_test_data, report_evaluation
 from stereoforge.prediction import open_predictors
 from stereoforge.progress import console, progress_bar
 from training.train import train
@@ -65,14 +65,14 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
     for network in NETWORKS:
         with _stage(f"training the {network}, {plan.steps[network]} steps"):
             train(network, [(data, 1.0)], weights, "tiny", steps=plan.steps[network], resume=True)
-    test = StereoDataset(data, "test")
-    with _stage(f"refining and evaluating {len(test)} test pairs"):
-        evaluation = evaluate_datasets([test], open_predictors(weights))
+    (test,) = open_test_data([str(data)], "test")
+    with _stage(f"refining and evaluating {len(test.frames)} test pairs"):
+        evaluated = evaluate_set(test, open_predictors(weights))
     minutes = (time.monotonic() - started) / 60
     files = report_evaluation(
-        evaluation, [f"{data} (test)"], weights, out / "report", _limits(plan, minutes), "StereoForge demo"
+        [evaluated], weights, out / "report", limits=_limits(plan, minutes), title="StereoForge demo"
     )
-    return DemoResult(data, weights, gallery, files.html, evaluation, minutes)
+    return DemoResult(data, weights, gallery, files.html, evaluated.evaluation, minutes)
 
 
 @contextmanager

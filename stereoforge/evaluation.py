@@ -1,62 +1,112 @@
-"""Joining data sets, networks and the MRF into an evaluation and its report."""
+"""Joining data sets, networks and the MRF into evaluations and their report."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from datagen import StereoSample
 from datagen.frame import StereoFrame
-from refine.evaluation import Evaluation, evaluate
+from datagen.manifest import read_manifest
+from datagen.source import open_source
+from refine.evaluation import EvaluationOptions, evaluate
 from refine.methods import Method
 from refine.report import ReportContext, ReportFiles, write_report
+from refine.results import EvaluatedSet
 from stereoforge.prediction import Predictors
 from stereoforge.progress import progress_bar
+from training.presets import TASKS
+from training.weights import has_weights, read_summary
+
+KITTI_BAD_PX = 3.0
+"""KITTI's threshold of a bad pixel; everybody else's is 1 px."""
 
 
-def evaluate_datasets(
-    datasets: Sequence[Sequence[StereoFrame]], predictors: Predictors, methods: tuple[Method, ...] = ()
-) -> Evaluation:
+@dataclass(frozen=True)
+class TestData:
+    """Frames to evaluate on, with what a reader wants to know of them."""
+
+    name: str
+    frames: Sequence[StereoFrame]
+    family: str
+    """The family of our worlds, or the format of somebody else's data set."""
+    split: str
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+    __test__ = False
+    """Not a test, whatever pytest thinks of its name."""
+
+
+def open_test_data(sources: Sequence[str], split: str) -> list[TestData]:
+    """Open data sets as `datagen.source` takes them; raises DatasetError, naming what is wrong.
+
+    A set is called after its folder, or by all of its source where two folders have one name.
+    """
+    short = [Path(source.partition("#")[0]).name or source for source in sources]
+    names = [name if short.count(name) == 1 else source for name, source in zip(short, sources, strict=True)]
+    opened = []
+    for name, source in zip(names, sources, strict=True):
+        frames = open_source(source).frames(split)
+        family = family_of(source, frames)
+        facts = {"Source": source, "Split": split} | ({"Family": family} if family else {})
+        opened.append(TestData(name, frames, family, split, facts))
+    return opened
+
+
+def family_of(source: str, frames: Sequence[StereoFrame]) -> str:
+    """The family that rendered a set of ours, by its first scene's manifest; else the format's name."""
+    first = frames[0]
+    if isinstance(first, StereoSample):
+        return read_manifest(first.layout.manifest(first.split, first.scene)).family
+    return open_source(source).format.name
+
+
+def evaluation_options(family: str, bad_threshold: float | None = None) -> EvaluationOptions:
+    """The measures' thresholds: those asked for, or the data's custom."""
+    custom = KITTI_BAD_PX if family.startswith("kitti") else EvaluationOptions().bad_threshold
+    return EvaluationOptions(bad_threshold=custom if bad_threshold is None else bad_threshold)
+
+
+def evaluate_set(
+    data: TestData,
+    predictors: Predictors,
+    methods: tuple[Method, ...] = (),
+    options: EvaluationOptions | None = None,
+) -> EvaluatedSet:
     """Run the networks and every method on every frame, showing progress."""
     with progress_bar() as progress:
-        task = progress.add_task("evaluating", total=sum(map(len, datasets)))
-        return evaluate(
-            (predictors.frame(sample) for dataset in datasets for sample in dataset),
+        task = progress.add_task(f"evaluating on {data.name}", total=len(data.frames))
+        evaluation = evaluate(
+            (predictors.frame(frame) for frame in data.frames),
             methods,
+            options or evaluation_options(data.family),
             progress=lambda done, _: progress.update(task, completed=done),
         )
+    return EvaluatedSet(data.name, evaluation, data.family, data.split, data.facts)
 
 
 def report_evaluation(
-    evaluation: Evaluation,
-    sources: Sequence[str],
+    sets: Sequence[EvaluatedSet],
     weights: Path,
     out: Path,
+    *,
     limits: tuple[str, ...] = (),
     title: str = "StereoForge evaluation",
+    facts: Mapping[str, str] | None = None,
+    bootstrap_seed: int = 0,
 ) -> ReportFiles:
-    """Write the report, saying what was evaluated with what.
-
-    sources: the data sets' names, with their splits.
-    """
-    return write_report(
-        evaluation,
-        out,
-        ReportContext(
-            title=title,
-            facts={
-                "Data": ", ".join(sources),
-                "Frames": str(len(evaluation.frames)),
-                "Weights": "; ".join(_describe_networks(weights)),
-            },
-            limits=limits,
-        ),
+    """Write the report, saying what was evaluated with what."""
+    context = ReportContext(
+        title=title,
+        facts={"Weights": "; ".join(_describe_networks(weights)), **(facts or {})},
+        limits=limits,
+        bootstrap_seed=bootstrap_seed,
     )
+    return write_report(sets, out, context)
 
 
 def _describe_networks(weights: Path) -> Iterator[str]:
-    from training.presets import TASKS
-    from training.weights import has_weights, read_summary
-
     for task in TASKS:
         if has_weights(weights, task):
             summary = read_summary(weights, task)

@@ -11,6 +11,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen import StereoSample
 from datagen.frame import StereoFrame
 from matching import SGBMParameters, left_right_consistency, match_both
 from refine.evaluation import EvaluationFrame
@@ -82,9 +83,11 @@ class Predictors:
     def frame(self, sample: StereoFrame) -> EvaluationFrame:
         """One sample with all that is predicted for it, and how long that took.
 
-        Where nobody knows what is occluded, nothing is taken to be.
+        Where nobody knows what is occluded, nothing is taken to be. Object maps are KITTI's, cars told from the
+        rest; those of our own sets number everything. Frames of one folder are of one scene.
         """
         occlusion = sample.occlusion_left
+        objects = None if isinstance(sample, StereoSample) else sample.object_index_left
         began = time.perf_counter()
         prediction = self.initial.predict(sample.left, sample.right)
         seconds = {"disparity": time.perf_counter() - began}
@@ -103,6 +106,8 @@ class Predictors:
             gradient=prediction.gradient,
             right=sample.right,
             fine_tuned=fine_tuned,
+            objects=objects,
+            scene=sample.name.rpartition("/")[0],
             other_confidences={}
             if self.forest is None
             else {"rdf": self._forest_confidence(sample, prediction)},

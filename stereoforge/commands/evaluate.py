@@ -8,13 +8,18 @@ from typing import Annotated, Literal
 
 import tyro
 
+from stereoforge.errors import UsageError
 from stereoforge.progress import console
 from stereoforge.values import parse_methods, shown
 
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Evaluate on data sets and write report.html, results.csv and results.json."""
+    """Evaluate on data sets: the paper's tables and figures, one block a set, its numbers beside ours.
+
+    Writes report.html, every number as results.csv and results.json, the paper's tables as tables.csv, .json, .md
+    and .tex, and figures/.
+    """
 
     data: Annotated[tyro.conf.Positional[tuple[str, ...]], shown("DATA")]
     """Data sets: folders or URLs, with FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
@@ -31,26 +36,44 @@ class Evaluate:
     confnet_free and gradnet_free."""
     parameters: Annotated[Path | None, shown("FILE", "the run folder's, if it has one")] = None
     """The methods' parameters, as `stereoforge tune` writes them."""
+    bad_threshold: Annotated[float | None, shown("PX", "1, for KITTI 3")] = None
+    """A disparity further off than this is bad, in pixels."""
+    seed: Annotated[int, shown("N")] = 0
+    """Of the confidence intervals, which draw scenes with replacement."""
+    submission: Annotated[Path | None, shown("DIR", "none")] = None
+    """Also write the refined disparities of KITTI sets as its server takes them: DIR/disp_0/NNNNNN_10.png, those of
+    the set's testing part if it is there."""
     device: Annotated[str, shown("NAME")] = "cpu"
     """What the networks run on: cpu, cuda, ..."""
 
     def run(self) -> None:
-        from datagen.source import open_source
-        from stereoforge.errors import UsageError
-        from stereoforge.evaluation import evaluate_datasets, report_evaluation
-        from stereoforge.prediction import fallback_notes, open_predictors, open_settings
-
         methods = parse_methods(self.methods)
         if not self.data:
             raise UsageError("evaluate needs at least one data set")
-        datasets = [open_source(source).frames(self.split) for source in self.data]
-        predictors = open_predictors(self.weights, self.device, self.predictor)
+        if self.bad_threshold is not None and not self.bad_threshold > 0:
+            raise UsageError(f"--bad-threshold must be positive, got {self.bad_threshold}")
+        if self.seed < 0:
+            raise UsageError(f"--seed must not be negative, got {self.seed}")
+        from stereoforge.evaluation import evaluate_set, evaluation_options, open_test_data, report_evaluation
+        from stereoforge.prediction import fallback_notes, open_predictors, open_settings
+        from stereoforge.submission import find_submission_frames, write_submission
+
+        data = open_test_data(self.data, self.split)
+        to_submit = find_submission_frames(self.data) if self.submission else []
         settings = open_settings(self.parameters, self.weights, self.predictor)
-        evaluation = evaluate_datasets(datasets, predictors, settings.rows(methods))
-        names = [f"{source} ({self.split})" for source in self.data]
-        files = report_evaluation(evaluation, names, self.weights, self.out)
+        predictors = open_predictors(self.weights, self.device, self.predictor)
+        rows = settings.rows(methods)
+        sets = [
+            evaluate_set(each, predictors, rows, evaluation_options(each.family, self.bad_threshold))
+            for each in data
+        ]
+        files = report_evaluation(sets, self.weights, self.out, bootstrap_seed=self.seed)
         for note in fallback_notes(self.weights) if self.predictor == "sgbm" else []:
             console.print(note, markup=False)
-        for name, reason in evaluation.skipped.items():
+        for name, reason in sets[0].evaluation.skipped.items():
             console.print(f"{name} did not run: {reason}", markup=False)
-        console.print(f"{files.html}: {len(evaluation.frames)} frames")
+        frames = sum(len(each.evaluation.frames) for each in sets)
+        console.print(f"{files.html}: {frames} frames of {len(sets)} sets", markup=False)
+        if self.submission:
+            count = write_submission(to_submit, predictors, settings.ours, self.submission)
+            console.print(f"{self.submission}: {count} disparities", markup=False)

@@ -105,8 +105,8 @@ def test_no_data_and_wrong_folders_are_sentences(tmp_path: Path, refused: Callab
 def test_the_demo_leaves_what_it_promises(demo: tuple[Path, DemoResult]) -> None:
     out, result = demo
     numbers = json.loads((out / "report" / "results.json").read_text())
-    assert set(numbers["set"]["methods"]) == set(known_methods())
-    assert all(row["seconds"] > 0 for row in numbers["set"]["methods"].values())
+    assert set(numbers["sets"][0]["methods"]) == set(known_methods())
+    assert all(row["seconds"] > 0 for row in numbers["sets"][0]["methods"].values())
     for page in (result.report, result.gallery):
         text = page.read_text()
         assert "<html" in text
@@ -188,7 +188,7 @@ def test_tuned_parameters_are_evaluated_with(demo: tuple[Path, DemoResult], tmp_
     assert all("VAL" in name for name in tuned.about["frames"])
     report = ("--out", tmp_path / "report", "--methods", "wmf", "--parameters", file)
     assert run("evaluate", *common, *report, "--split", "val") == 0
-    got = json.loads((tmp_path / "report" / "results.json").read_text())["set"]["methods"]["wmf"]
+    got = json.loads((tmp_path / "report" / "results.json").read_text())["sets"][0]["methods"]["wmf"]
     frames = [open_predictors(out / "weights").frame(sample) for sample in StereoDataset(out / "data", "val")]
     assert got["epe_all"] == pytest.approx(measure(tuned.methods["wmf"], frames).epe)
 
