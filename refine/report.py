@@ -36,6 +36,7 @@ from refine.table_files import (
     caption,
     printed,
     printed_interval,
+    printed_paper,
     printed_ratio,
     tables_csv,
     tables_json,
@@ -147,6 +148,7 @@ def _page(sets: Sequence[EvaluatedSet], views: list[SetView], context: ReportCon
         caption=caption,
         printed=printed,
         printed_interval=printed_interval,
+        printed_paper=printed_paper,
         printed_ratio=printed_ratio,
     )
 

@@ -175,24 +175,31 @@ def missing_notes(evaluation: Evaluation) -> list[str]:
 
 
 def confidence_table(evaluation: Evaluation) -> Table:
-    """Mean area under the sparsification curve, and on how many frames each measure beats ConfNet."""
+    """Mean area under the sparsification curve, and on how many frames ConfNet beats each other measure."""
     aucs = mean_aucs(evaluation)
     room = aucs["random"] - aucs["optimal"]
+    rivals = aucs.keys() - {"confnet", *BOUNDS}
+    compared = "confnet" in aucs and bool(rivals)
     rows = []
     for name, auc in sorted(aucs.items(), key=lambda item: item[1]):
         share = (aucs["random"] - auc) / room if room > 0 else math.nan
-        lost = [
-            frame.aucs["confnet"] < frame.aucs[name]
-            for frame in evaluation.frames
-            if {"confnet", name} <= frame.aucs.keys()
-        ]
-        beaten = sum(lost) / len(lost) if lost and name not in ("confnet", *BOUNDS) else math.nan
-        cells = (number(auc, 4), number(share, 1, scale=100), number(beaten, 0, scale=100))
-        rows.append((CONFIDENCE_LABELS.get(name, name), cells))
-    return Table(
-        ("Order of removal", "mean AUC", "of random → optimal, %", "frames where ConfNet is better, %"),
-        tuple(rows),
-    )
+        cells = [number(auc, 4), number(share, 1, scale=100)]
+        if compared:
+            beaten = _share_beaten(evaluation, name) if name in rivals else math.nan
+            cells.append(number(beaten, 0, scale=100))
+        rows.append((CONFIDENCE_LABELS.get(name, name), tuple(cells)))
+    headings = ("Order of removal", "mean AUC", "of random → optimal, %", "ConfNet is better, % of frames")
+    return Table(headings if compared else headings[:-1], tuple(rows))
+
+
+def _share_beaten(evaluation: Evaluation, name: str) -> float:
+    """Share of the frames with both measures on which ConfNet's area is the smaller."""
+    pairs = [
+        (frame.aucs["confnet"], frame.aucs[name])
+        for frame in evaluation.frames
+        if {"confnet", name} <= frame.aucs.keys()
+    ]
+    return sum(ours < theirs for ours, theirs in pairs) / len(pairs) if pairs else math.nan
 
 
 def frame_table(evaluation: Evaluation) -> Table:

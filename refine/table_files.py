@@ -7,6 +7,7 @@ import io
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from refine.paper_tables import MeasureColumn, PaperCell, PaperTable
@@ -104,6 +105,11 @@ def printed(value: float, column: MeasureColumn) -> str:
     return "–" if math.isnan(value) else f"{value * column.scale:.{column.digits}f}"
 
 
+def printed_paper(cell: PaperCell, column: MeasureColumn) -> str:
+    """The paper's number with the digits it has there."""
+    return printed(cell.paper, replace(column, digits=min(column.digits, 2)))
+
+
 def printed_interval(cell: PaperCell, column: MeasureColumn) -> str:
     """The confidence interval, empty where there is none."""
     low, high = cell.interval.low, cell.interval.high
@@ -157,7 +163,7 @@ def _texts(table: PaperTable, column: MeasureColumn, cell: PaperCell) -> tuple[s
     )
     if not table.has_paper:
         return (here,)
-    return here, " ".join(filter(None, (printed(cell.paper, column), printed_ratio(cell.paper_ratio))))
+    return here, " ".join(filter(None, (printed_paper(cell, column), printed_ratio(cell.paper_ratio))))
 
 
 def _pipes(cells: Sequence[str]) -> str:
