@@ -61,6 +61,8 @@ class ReportContext:
     limits: tuple[str, ...] = ()
     """Honest sentences a reader must know before believing a number: budget, sizes, what is missing."""
     bootstrap_seed: int = 0
+    sections: str = ""
+    """Further parts of the page as HTML, put between the summary and the sets; the first has the id "gap"."""
 
 
 @dataclass(frozen=True)

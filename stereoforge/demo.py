@@ -10,14 +10,14 @@ from pathlib import Path
 
 from rich.table import Table
 
-from datagen import Recipe, render_dataset
+from datagen import Recipe
 from datagen.gallery import write_gallery
 from refine.evaluation import Evaluation
 from scenes.families.flying_things import FlyingThingsConfig
-from stereoforge.errors import CommandError
 from stereoforge.evaluation import evaluate_set, open_test_data, report_evaluation
 from stereoforge.prediction import open_predictors
-from stereoforge.progress import console, progress_bar
+from stereoforge.progress import console
+from stereoforge.rendering import render_all
 from training.train import train
 
 NETWORKS = ("regressor", "confnet", "gradnet", "regressor_f")
@@ -58,7 +58,7 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
     started = time.monotonic()
     data, weights = out / "data", out / "weights"
     with _stage(f"rendering {sum(plan.scenes.values()) * plan.world.frames} stereo pairs"):
-        _render(plan, data)
+        render_all(Recipe(plan.world, plan.scenes), data)
     gallery = out / "gallery.html"
     with _stage("making the gallery"):
         write_gallery(data, gallery, scenes=plan.gallery_scenes)
@@ -82,19 +82,6 @@ def _stage(title: str) -> Iterator[None]:
     console.print(f"{title} ...")
     yield
     console.print(f"    {time.monotonic() - started:.0f} s")
-
-
-def _render(plan: DemoPlan, data: Path) -> None:
-    with progress_bar() as progress:
-        task = progress.add_task("rendering", total=None)
-        summary = render_dataset(
-            Recipe(plan.world, plan.scenes),
-            data,
-            on_scene=lambda done, total, _: progress.update(task, completed=done, total=total),
-        )
-    if summary.failures:
-        scene, reason = summary.failures[0]
-        raise CommandError(f"{len(summary.failures)} scenes could not be rendered, {scene} because {reason}")
 
 
 def _limits(plan: DemoPlan, minutes: float) -> tuple[str, ...]:

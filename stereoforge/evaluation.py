@@ -95,13 +95,15 @@ def report_evaluation(
     title: str = "StereoForge evaluation",
     facts: Mapping[str, str] | None = None,
     bootstrap_seed: int = 0,
+    sections: str = "",
 ) -> ReportFiles:
-    """Write the report, saying what was evaluated with what."""
+    """Write the report, saying what was evaluated with what; the arguments are those of `ReportContext`."""
     context = ReportContext(
         title=title,
         facts={"Weights": "; ".join(_describe_networks(weights)), **(facts or {})},
         limits=limits,
         bootstrap_seed=bootstrap_seed,
+        sections=sections,
     )
     return write_report(sets, out, context)
 

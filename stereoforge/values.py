@@ -58,6 +58,17 @@ def parse_weighted_source(text: str) -> tuple[str, float]:
     return source, weight
 
 
+def parse_counts(flag: str, text: str, names: tuple[str, ...]) -> dict[str, int]:
+    """Numbers by name out of "train=100,val=5"."""
+    counts = {}
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        match = re.fullmatch(r"(\w+)=(\d{1,9})", part)
+        if not match or match[1] not in names:
+            raise UsageError(f"{flag} takes NAME=N, comma-separated, of {', '.join(names)}, not {part!r}")
+        counts[match[1]] = int(match[2])
+    return counts
+
+
 def parse_methods(text: str) -> tuple[str, ...]:
     """Names of methods out of "ours,wmf"; empty for all there are."""
     from refine.methods import default_methods

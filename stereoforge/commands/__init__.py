@@ -7,6 +7,7 @@ from stereoforge.commands.demo import Demo
 from stereoforge.commands.evaluate import Evaluate
 from stereoforge.commands.refine import Refine
 from stereoforge.commands.render import Render
+from stereoforge.commands.study import Study
 from stereoforge.commands.train import Train
 from stereoforge.commands.tune import Tune
 from stereoforge.commands.verify import Verify
@@ -28,6 +29,7 @@ COMMANDS: dict[str, Callable[..., Command]] = {
     "tune": Tune,
     "refine": Refine,
     "evaluate": Evaluate,
+    "study": Study,
     "demo": Demo,
 }
 """Every command by its name, in the order of use."""

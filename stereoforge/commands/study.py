@@ -1,0 +1,96 @@
+"""`stereoforge study`: train on some domains, test on others, and say what closes the gap between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from scenes import FAMILIES
+from stereoforge.errors import UsageError
+from stereoforge.progress import console
+from stereoforge.values import parse_counts, parse_methods, parse_size, shown
+
+if TYPE_CHECKING:
+    from stereoforge.study import StudyPlan
+
+
+@dataclass(frozen=True)
+class Study:
+    """The domain-gap study: render what is missing, train what is missing, evaluate all, report.
+
+    Domains are families of worlds, or data sets that are there. Run it again to continue, or with other flags to
+    extend it: every step has a folder named by all that decides its result, and is done once. OUT/results holds the
+    report, the tables, the gap and summary.json.
+    """
+
+    out: Annotated[Path, shown("DIR")]
+    """Folder for everything."""
+    train: Annotated[tuple[str, ...], shown("DOMAIN")] = ()
+    """Domains to train on. The first is the subject of the study; the others give the errors in their own domain."""
+    test: Annotated[tuple[str, ...], shown("DOMAIN")] = ()
+    """Domains to test on."""
+    plan: Annotated[Path | None, shown("FILE", "none")] = None
+    """A plan.yaml that says it all, instead of the flags."""
+    preset: Literal["tiny", "small", "full"] = "small"
+    """Of all networks."""
+    size: Annotated[str, shown("WxH")] = "384x192"
+    """Image size of what is rendered, in pixels."""
+    scenes: Annotated[str, shown("COUNTS")] = "train=100,val=5,test=25"
+    """Scenes of each split of each family."""
+    frames_per_scene: Annotated[int, shown("N")] = 4
+    """Frames in each scene."""
+    steps: Annotated[str, shown("COUNTS", "the preset's")] = ""
+    """Training steps, for example regressor=8000,confnet=1000,gradnet=1000,regressor_f=500."""
+    fine_tuning_steps: Annotated[int, shown("N")] = 0
+    """Steps of the subject's regressor on each other domain; 0 leaves that out."""
+    tuning_frames: Annotated[int, shown("N")] = 0
+    """Validation frames to choose the methods' parameters on; 0 takes the defaults."""
+    methods: Annotated[str, shown("LIST", "all there are")] = ""
+    """Rows of the subject's tables, comma-separated."""
+    seed: Annotated[int, shown("N")] = 0
+    """Everything random follows from it."""
+    device: Annotated[str, shown("NAME")] = "cpu"
+    """What the networks run on: cpu, cuda, ..."""
+
+    def run(self) -> None:
+        plan = self._plan()
+        from stereoforge.study import run_study
+
+        result = run_study(plan, self.out, device=self.device)
+        for gap in result.gaps:
+            shares = ", ".join(f"{name} {share:.0%}" for name, share in gap.shares.items() if share == share)
+            if shares:
+                console.print(
+                    f"{gap.domain}, {gap.measure}: of a gap of {gap.size:.3g}, {shares}", markup=False
+                )
+        console.print(f"{result.report}", markup=False)
+
+    def _plan(self) -> StudyPlan:
+        from stereoforge.study import DomainPlan, StudyPlan, read_plan
+
+        if self.plan is not None:
+            defaults = Study(self.out, plan=self.plan, device=self.device)
+            if self != defaults:
+                raise UsageError("--plan says it all: besides it only --out and --device may be given")
+            return read_plan(self.plan)
+        domains = {}
+        for name in (*self.train, *self.test):
+            family = name in FAMILIES
+            domains[name] = DomainPlan(
+                source=None if family else name,
+                config={"frames": self.frames_per_scene} if family else {},
+                scenes=parse_counts("--scenes", self.scenes, ("train", "val", "test")),
+                steps=parse_counts("--steps", self.steps, ("regressor", "regressor_f", "confnet", "gradnet")),
+            )
+        return StudyPlan(
+            domains=domains,
+            train=self.train,
+            test=self.test,
+            size=parse_size(self.size),
+            seed=self.seed,
+            preset=self.preset,
+            fine_tuning_steps=self.fine_tuning_steps,
+            tuning_frames=self.tuning_frames,
+            methods=parse_methods(self.methods),
+        )

@@ -1,0 +1,83 @@
+"""Jobs that are done once: each has a folder named by all that decides its result."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from stereoforge.progress import console
+from storage import write_text
+
+FINISHED = "finished.json"
+"""Written last into a job's folder, with the settings that named it."""
+KEY_LENGTH = 12
+
+
+@dataclass(frozen=True)
+class Job:
+    """One step of a study."""
+
+    title: str
+    folder: Path
+    """Its last twelve characters are the digest of `settings`, so another setting is another folder."""
+    settings: Mapping[str, Any]
+    expected_seconds: float
+    """A guess for the machine the defaults were made on; the pace so far corrects it."""
+    run: Callable[[], None]
+    """Continues what an interrupted run left in the folder."""
+
+    @property
+    def key(self) -> str:
+        return self.folder.name[-KEY_LENGTH:]
+
+    @property
+    def finished(self) -> bool:
+        return (self.folder / FINISHED).is_file()
+
+
+def make_job(
+    parent: Path,
+    name: str,
+    title: str,
+    settings: Mapping[str, Any],
+    seconds: float,
+    run: Callable[[Path], None],
+) -> Job:
+    """A job whose folder is `parent/name-<digest of the settings>`; `run` is given that folder."""
+    text = json.dumps(settings, sort_keys=True, default=list)
+    folder = parent / f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:KEY_LENGTH]}"
+    return Job(title, folder, settings, seconds, lambda: run(folder))
+
+
+def run_jobs(jobs: Sequence[Job]) -> None:
+    """Run those that are not finished, in order, saying how far the whole is and how long it may still take."""
+    missing = [job for job in jobs if not job.finished]
+    ahead = sum(job.expected_seconds for job in missing)
+    expected = 0.0
+    began = time.monotonic()
+    if len(missing) < len(jobs):
+        console.print(f"{len(jobs) - len(missing)} of {len(jobs)} steps are done already")
+    for job in missing:
+        pace = (time.monotonic() - began) / expected if expected else 1.0
+        place = jobs.index(job) + 1
+        left = duration((ahead - expected) * pace)
+        console.print(
+            f"step {place} of {len(jobs)}: {job.title}; about {left} left of the whole", markup=False
+        )
+        job.folder.mkdir(parents=True, exist_ok=True)
+        job.run()
+        write_text(job.folder / FINISHED, json.dumps(job.settings, indent=1, default=list) + "\n")
+        expected += job.expected_seconds
+
+
+def duration(seconds: float) -> str:
+    """A time as one says it: "40 s", "12 min", "3 h 05 min"."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60:02d} min"

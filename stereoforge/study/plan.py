@@ -1,0 +1,133 @@
+"""What a study consists of, as a typed record and as one YAML file."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cattrs
+import yaml
+
+from datagen import Recipe
+from datagen.recipe import recipe_from_plain
+from refine.methods import default_methods
+from scenes import FAMILIES
+from stereoforge.errors import UsageError
+from training.presets import TASKS, find_preset
+
+TRAINING_SPLITS = ("train", "val")
+TEST_SPLITS = ("test",)
+_CONVERTER = cattrs.Converter(forbid_extra_keys=True)
+
+
+@dataclass(frozen=True)
+class DomainPlan:
+    """One kind of data: worlds to be rendered, or a data set that is there."""
+
+    source: str | None = None
+    """A data set as `datagen.source` takes it; None renders the family of the domain's name."""
+    config: dict[str, Any] = field(default_factory=dict)
+    """Fields of the family's config that differ from its defaults, `frames` a scene for example; the size is the
+    study's."""
+    scenes: dict[str, int] = field(default_factory=lambda: {"train": 100, "val": 5, "test": 25})
+    """Scenes of each split; those of the training splits are rendered only where something is trained on them."""
+    steps: dict[str, int] = field(default_factory=dict)
+    """Training steps of each network; the preset's where none are given."""
+
+
+@dataclass(frozen=True)
+class StudyPlan:
+    """Everything that decides a study's numbers."""
+
+    domains: dict[str, DomainPlan]
+    """By name: a family's, or any for a data set that is there."""
+    train: tuple[str, ...]
+    """Domains to train on. The first is the subject: every method is run with its networks, and its gap to the
+    others is what refinement and fine-tuning are to close. The others give the errors in their own domain."""
+    test: tuple[str, ...]
+    """Domains to test on."""
+    size: tuple[int, int] = (384, 192)
+    """Width and height of what is rendered, in pixels."""
+    seed: int = 0
+    """Of the worlds, the training and the confidence intervals."""
+    samples: int = 4
+    """Paths a pixel."""
+    preset: str = "small"
+    fine_tuning_steps: int = 0
+    """Steps of the subject's regressor on each other test domain's training split; 0 leaves that out."""
+    tuning_frames: int = 0
+    """Validation frames of each training domain on which the methods' parameters are chosen; 0 takes the
+    defaults."""
+    methods: tuple[str, ...] = ()
+    """Rows of the subject's tables; empty for all there are."""
+
+    def __post_init__(self) -> None:
+        if not self.train or not self.test:
+            raise UsageError("a study needs at least one domain to train on and one to test on")
+        for name in (*self.train, *self.test):
+            if name not in self.domains:
+                raise UsageError(f"the study has no domain {name!r}; it has {', '.join(self.domains)}")
+        for role in (self.train, self.test):
+            if len(set(role)) != len(role):
+                raise UsageError(f"a domain is named twice in {', '.join(role)}")
+        for name, domain in self.domains.items():
+            if domain.source is None and name not in FAMILIES:
+                raise UsageError(f"there is no family {name}; there are {', '.join(FAMILIES)}")
+            if unknown := domain.steps.keys() - set(TASKS):
+                raise UsageError(f"{name}: there is no network {min(unknown)}; there are {', '.join(TASKS)}")
+            if min((*domain.scenes.values(), *domain.steps.values()), default=1) < 1:
+                raise UsageError(f"{name}: numbers of scenes and steps must be at least 1")
+        if min(self.fine_tuning_steps, self.tuning_frames, self.seed) < 0:
+            raise UsageError("fine_tuning_steps, tuning_frames and the seed must not be negative")
+        find_preset("regressor", self.preset)
+        try:
+            default_methods(self.methods)
+        except ValueError as error:
+            raise UsageError(f"methods: {error}") from error
+
+    @property
+    def subject(self) -> str:
+        return self.train[0]
+
+    @property
+    def fine_tuned(self) -> tuple[str, ...]:
+        """The domains that the subject is fine-tuned on."""
+        return tuple(name for name in self.test if name != self.subject) if self.fine_tuning_steps else ()
+
+    def recipe(self, name: str, splits: tuple[str, ...]) -> Recipe:
+        """What to render of a domain for training or for testing. Raises DatasetError for a wrong config."""
+        domain = self.domains[name]
+        width, height = self.size
+        world = {"family": name, **_sized(domain.config, width, height)}
+        scenes = {split: domain.scenes.get(split, 0) for split in splits}
+        plain = {"world": world, "scenes": scenes, "seed": self.seed, "samples": self.samples}
+        return recipe_from_plain(plain, f"the domain {name}")
+
+    def plain(self) -> dict[str, Any]:
+        """As the YAML file has it."""
+        document: dict[str, Any] = _CONVERTER.unstructure(asdict(self))
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in document.items()}
+
+
+def read_plan(path: Path) -> StudyPlan:
+    """Raises UsageError for a file that is missing, no YAML, or no plan."""
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise UsageError(f"there is no plan {path}") from error
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise UsageError(f"cannot read the plan {path}: {' '.join(str(error).split())}") from error
+    try:
+        return _CONVERTER.structure(data, StudyPlan)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+    except cattrs.BaseValidationError as error:
+        reason = "; ".join(cattrs.transform_error(error))
+        raise UsageError(f"{path} is not a valid plan: {reason}") from error
+
+
+def _sized(config: dict[str, Any], width: int, height: int) -> dict[str, Any]:
+    if config.keys() & {"width", "height", "family"}:
+        raise UsageError("a domain's config must not set family, width or height: the study does")
+    return {**config, "width": width, "height": height}

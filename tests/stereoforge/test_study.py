@@ -1,0 +1,211 @@
+"""Studies: the arithmetic of the gap, plans, jobs done once, and a whole small study of rendered worlds."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from refine.evaluation import evaluate
+from refine.methods import default_methods
+from refine.results import EvaluatedSet
+from scenes import FAMILIES
+from stereoforge.errors import UsageError
+from stereoforge.study import DomainPlan, StudyPlan, StudyResult, read_plan, run_study
+from stereoforge.study.gap import Gap, gaps, summary
+from stereoforge.study.jobs import duration, make_job, run_jobs
+from tests.refine.worlds import toy_frame
+from training.presets import TASKS, Preset, find_preset
+
+SIZE = (128, 64)
+STEPS = {"regressor": 2, "regressor_f": 1, "confnet": 1, "gradnet": 1}
+
+
+def tiny_presets() -> dict[str, Preset]:
+    """Presets whose crops fit tiny frames."""
+    return {
+        task: replace(
+            find_preset(task, "tiny"),
+            crop_width=SIZE[0],
+            crop_height=SIZE[1],
+            batch_size=1,
+            validation_interval=1,
+            validation_samples=1,
+        )
+        for task in TASKS
+    }
+
+
+def tiny_plan(**changes: Any) -> StudyPlan:
+    names = [name for name in ("flying_things", "driving") if name in FAMILIES]
+    domain = DomainPlan(config={"frames": 1}, scenes={"train": 1, "val": 1, "test": 2}, steps=STEPS)
+    plan = StudyPlan(
+        domains=dict.fromkeys(names, domain),
+        train=tuple(names),
+        test=tuple(names),
+        size=SIZE,
+        samples=1,
+        fine_tuning_steps=1,
+        methods=("regressor", "gradnet", "ours", "ours_conf_gt"),
+    )
+    return replace(plan, **changes)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, StudyResult]:
+    out = tmp_path_factory.mktemp("study")
+    return out, run_study(tiny_plan(), out, presets=tiny_presets())
+
+
+def evaluated(seed: int) -> EvaluatedSet:
+    rows = default_methods(("regressor", "ours", "ours_conf_gt"))
+    return EvaluatedSet(str(seed), evaluate([toy_frame(seed, 24, 32)], rows))
+
+
+def test_shares_of_a_gap_worked_out_by_hand() -> None:
+    gap = Gap("driving", "epe_all", cross=10, home=4, refined=8.5, true_confidence=7, fine_tuned=4)
+    assert gap.size == 6
+    assert gap.shares == {
+        "refinement": 0.25,
+        "refinement, true confidence": 0.5,
+        "fine-tuning on the domain": 1.0,
+    }
+    assert all(share != share for share in replace(gap, home=11).shares.values())
+    assert all(share != share for share in replace(gap, home=float("nan")).shares.values())
+
+
+def test_gaps_and_summary_come_from_the_right_cells() -> None:
+    cells = {("a", "a"): evaluated(0), ("a", "b"): evaluated(1), ("b", "b"): evaluated(2)}
+    found = gaps("a", ("a", "b"), cells, {"b": evaluated(3)})
+    assert [(gap.domain, gap.measure) for gap in found] == [
+        ("b", "epe_all"),
+        ("b", "bad_all"),
+        ("b", "gradient_masked"),
+    ]
+
+    def epe(cell: EvaluatedSet, method: str) -> float:
+        return cell.evaluation.scores[method].regions["all"].epe
+
+    first = found[0]
+    assert first.cross == epe(cells["a", "b"], "regressor")
+    assert first.home == epe(cells["b", "b"], "regressor")
+    assert first.refined == epe(cells["a", "b"], "ours")
+    assert first.true_confidence == epe(cells["a", "b"], "ours_conf_gt")
+    assert first.fine_tuned == epe(evaluated(3), "regressor")
+    numbers = summary("a", ("a", "b"), cells)
+    assert numbers["b"]["ours"]["epe"] == first.refined
+    assert set(numbers["a"]["regressor"]) == {"bad1", "epe", "gradient"}
+    assert 0 <= (numbers["a"]["regressor"]["bad1"] or -1) <= 1
+
+
+def test_a_plan_survives_its_file(tmp_path: Path) -> None:
+    plan = tiny_plan()
+    path = tmp_path / "plan.yaml"
+    path.write_text(yaml.safe_dump(plan.plain()))
+    assert read_plan(path) == plan
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"train": ()}, "at least one domain"),
+        ({"test": ("nowhere",)}, "no domain 'nowhere'"),
+        ({"domains": {"swimming": DomainPlan()}, "train": ("swimming",), "test": ("swimming",)}, "no family"),
+        ({"methods": ("magic",)}, "no method 'magic'"),
+        ({"tuning_frames": -1}, "must not be negative"),
+        ({"test": ("flying_things", "flying_things")}, "named twice"),
+    ],
+)
+def test_plans_that_cannot_be_are_refused(changes: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(UsageError, match=complaint):
+        tiny_plan(**changes)
+
+
+def test_files_that_are_no_plans_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "plan.yaml"
+    with pytest.raises(UsageError, match="there is no plan"):
+        read_plan(path)
+    for text in ("[1, 2", "train: 3", "{}", "domains: {flying_things: {speed: 3}}\ntrain: [a]\ntest: [a]"):
+        path.write_text(text)
+        with pytest.raises(UsageError, match="plan"):
+            read_plan(path)
+
+
+def test_jobs_are_done_once_and_a_changed_setting_is_another_job(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    done: list[str] = []
+
+    def jobs(steps: int, broken: bool = False) -> list[Any]:
+        def fail(_: Path) -> None:
+            raise OSError("disk full")
+
+        first = make_job(tmp_path, "first", "first", {"steps": steps}, 60, lambda _: done.append("first"))
+        run = fail if broken else lambda _: done.append("second")
+        return [first, make_job(tmp_path, "second", "second", {"of": first.key}, 120, run)]
+
+    with pytest.raises(OSError, match="disk full"):
+        run_jobs(jobs(1, broken=True))
+    assert "step 1 of 2: first; about 3 min left" in capsys.readouterr().out.replace("\n", " ")
+    run_jobs(jobs(1))
+    assert done == ["first", "second"]
+    run_jobs(jobs(1))
+    assert done == ["first", "second"]
+    run_jobs(jobs(2))
+    assert done == ["first", "second"] * 2
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_durations_read_as_one_says_them() -> None:
+    assert [duration(seconds) for seconds in (3, 700, 11100)] == ["3 s", "12 min", "3 h 05 min"]
+
+
+@pytest.mark.slow
+def test_a_study_of_rendered_worlds_leaves_what_it_promises(study: tuple[Path, StudyResult]) -> None:
+    out, result = study
+    names = tiny_plan().test
+    assert set(result.cells) == {(a, b) for a in names for b in names}
+    numbers = json.loads((out / "results" / "summary.json").read_text())
+    assert set(numbers) == set(names)
+    for test in names:
+        scores = result.cells[names[0], test].evaluation.scores
+        assert set(numbers[test]) == set(scores)
+        assert numbers[test]["ours"]["epe"] == scores["ours"].regions["all"].epe
+        assert numbers[test]["gradnet"]["bad1"] is None
+    rows = list(csv.DictReader((out / "results" / "matrix.csv").read_text().splitlines()))
+    assert {(row["trained_on"], row["tested_on"]) for row in rows} == set(result.cells)
+    page = result.report.read_text()
+    assert "From domain to domain" in page
+    assert "https://" not in page
+    for name in ("tables.md", "tables.tex", "tables.csv", "plan.yaml", "gap.json", "figures/disparities.svg"):
+        assert (out / "results" / name).stat().st_size > 0
+    assert read_plan(out / "results" / "plan.yaml") == tiny_plan()
+
+
+@pytest.mark.slow
+def test_a_finished_study_does_nothing_again_and_a_change_redoes_what_it_touches(
+    study: tuple[Path, StudyResult], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, _ = study
+    kinds = ("data", "networks", "evaluations", "statistics", "runs")
+    before = {path: path.stat().st_mtime_ns for kind in kinds for path in (out / kind).rglob("*")}
+    results = (out / "results" / "summary.json").read_bytes()
+    run_study(tiny_plan(), out, presets=tiny_presets())
+    assert {path: path.stat().st_mtime_ns for kind in kinds for path in (out / kind).rglob("*")} == before
+    assert (out / "results" / "summary.json").read_bytes() == results
+    capsys.readouterr()
+
+    changed = {**STEPS, "confnet": 2}
+    name = tiny_plan().subject
+    domains = {key: replace(each, steps=changed) for key, each in tiny_plan().domains.items()}
+    plan = tiny_plan(domains=domains, train=(name,), test=(name,), fine_tuning_steps=0)
+    run_study(plan, out, presets=tiny_presets())
+    added = {path.relative_to(out).parts[:2] for kind in kinds for path in (out / kind).rglob("*")} - {
+        path.relative_to(out).parts[:2] for path in before
+    }
+    assert sorted(kind for kind, _ in added) == ["evaluations", "networks", "runs"]

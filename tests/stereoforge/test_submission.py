@@ -1,0 +1,72 @@
+"""KITTI's submission folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from datagen.formats import read_png, write_png
+from datagen.frame import StereoFrame
+from refine.baselines.regressor import Regressor
+from refine.evaluation import EvaluationFrame
+from stereoforge.errors import UsageError
+from stereoforge.submission import encode_disparity, find_submission_frames, write_submission
+
+SIZE = (20, 60)
+
+
+@dataclass
+class Brightness:
+    """Predicts the left image's red."""
+
+    def frame(self, sample: StereoFrame) -> EvaluationFrame:
+        disparity = sample.left[..., 0].astype(np.float32)
+        labels = np.zeros(sample.size, np.uint8)
+        return EvaluationFrame(sample.name, sample.left, sample.disparity_left, labels, disparity)
+
+
+def kitti_set(root: Path, testing: bool) -> Path:
+    rng = np.random.default_rng(0)
+    for part in ("training", "testing") if testing else ("training",):
+        for number in range(2):
+            for folder in ("image_2", "image_3"):
+                path = root / part / folder / f"{number:06d}_10.png"
+                path.parent.mkdir(parents=True, exist_ok=True)
+                iio.imwrite(path, rng.integers(0, 256, (*SIZE, 3), np.uint8))
+                iio.imwrite(path.with_name(f"{number:06d}_11.png"), np.zeros((*SIZE, 3), np.uint8))
+            truth = root / "training" / "disp_occ_0" / f"{number:06d}_10.png"
+            truth.parent.mkdir(exist_ok=True)
+            write_png(truth, np.full(SIZE, 2560, np.uint16))
+    return root
+
+
+@pytest.mark.parametrize("testing", [True, False])
+def test_the_folder_is_what_the_server_takes(tmp_path: Path, testing: bool) -> None:
+    root = kitti_set(tmp_path / "kitti", testing)
+    frames = find_submission_frames([str(root)])
+    count = write_submission(frames, Brightness(), Regressor(), tmp_path / "out")  # type: ignore[arg-type]
+    assert count == 2
+    written = sorted(
+        path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*.png")
+    )
+    assert written == ["disp_0/000000_10.png", "disp_0/000001_10.png"]
+    part = "testing" if testing else "training"
+    red = iio.imread(root / part / "image_2" / "000001_10.png")[..., 0].astype(int)
+    values = read_png(tmp_path / "out" / "disp_0" / "000001_10.png")
+    assert values.dtype == np.uint16
+    np.testing.assert_array_equal(values, np.maximum(red * 256, 1))
+
+
+def test_zero_means_no_estimate_only() -> None:
+    disparity = np.array([[np.nan, 0, 1 / 256, 1.5, 300, -2]], np.float32)
+    assert encode_disparity(disparity).tolist() == [[0, 1, 1, 384, 65535, 1]]
+
+
+def test_other_sets_cannot_be_submitted(tmp_path: Path) -> None:
+    kitti = kitti_set(tmp_path / "kitti", testing=False)
+    with pytest.raises(UsageError, match="exactly one KITTI data set, there are 2"):
+        find_submission_frames([str(kitti), f"kitti2015:{kitti}"])
