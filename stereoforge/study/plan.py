@@ -14,10 +14,13 @@ from datagen.recipe import recipe_from_plain
 from refine.methods import default_methods
 from scenes import FAMILIES
 from stereoforge.errors import UsageError
-from training.presets import TASKS, find_preset
+from stereoforge.forest import PLANS
+from training.presets import find_preset
 
 TRAINING_SPLITS = ("train", "val")
 TEST_SPLITS = ("test",)
+NETWORKS = ("regressor", "confnet", "gradnet", "regressor_f")
+"""What is trained on a domain, in this order; the last on the subject only."""
 _CONVERTER = cattrs.Converter(forbid_extra_keys=True)
 
 
@@ -59,6 +62,8 @@ class StudyPlan:
     tuning_frames: int = 0
     """Validation frames of each training domain on which the methods' parameters are chosen; 0 takes the
     defaults."""
+    forest: bool = False
+    """Whether the random-forest confidence is trained on the subject, as ConfNet's rival."""
     methods: tuple[str, ...] = ()
     """Rows of the subject's tables; empty for all there are."""
 
@@ -74,13 +79,19 @@ class StudyPlan:
         for name, domain in self.domains.items():
             if domain.source is None and name not in FAMILIES:
                 raise UsageError(f"there is no family {name}; there are {', '.join(FAMILIES)}")
-            if unknown := domain.steps.keys() - set(TASKS):
-                raise UsageError(f"{name}: there is no network {min(unknown)}; there are {', '.join(TASKS)}")
+            if unknown := domain.steps.keys() - set(NETWORKS):
+                raise UsageError(
+                    f"{name}: there is no network {min(unknown)}; there are {', '.join(NETWORKS)}"
+                )
             if min((*domain.scenes.values(), *domain.steps.values()), default=1) < 1:
                 raise UsageError(f"{name}: numbers of scenes and steps must be at least 1")
         if min(self.fine_tuning_steps, self.tuning_frames, self.seed) < 0:
             raise UsageError("fine_tuning_steps, tuning_frames and the seed must not be negative")
         find_preset("regressor", self.preset)
+        if self.forest and self.preset not in PLANS:
+            raise UsageError(
+                f"there is no forest of the preset {self.preset!r}; there are {', '.join(PLANS)}"
+            )
         try:
             default_methods(self.methods)
         except ValueError as error:

@@ -12,26 +12,25 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 
-from datagen import StereoDataset
 from datagen.dataset import open_layout
 from datagen.errors import DatasetError
 from datagen.source import open_source
 from refine.archive import read_evaluation, write_evaluation
 from refine.evaluation import EvaluationOptions
 from refine.methods import table_order
-from refine.settings import FILE_NAME
 from scenes.serialization import to_plain
 from stereoforge.evaluation import TestData, evaluate_set, evaluation_options, family_of
-from stereoforge.prediction import open_predictors, open_settings
+from stereoforge.forest import PLANS, train_forest
+from stereoforge.prediction import forest_file, open_predictors, open_settings, parameters_file
 from stereoforge.rendering import render_all
 from stereoforge.study.jobs import Job, make_job, run_jobs
-from stereoforge.study.plan import TEST_SPLITS, TRAINING_SPLITS, StudyPlan
+from stereoforge.study.plan import NETWORKS, TEST_SPLITS, TRAINING_SPLITS, StudyPlan
 from stereoforge.study.results import StudyResult, write_results
 from stereoforge.study.statistics import describe, read_statistics, write_statistics
 from stereoforge.tuning import VALIDATION, Tuning, validation_frames
 from stereoforge.tuning import describe as describe_tuning
 from storage import write_bytes
-from training.presets import TASKS, Preset, find_preset
+from training.presets import Preset, find_preset
 from training.train import train
 
 PANELS = EvaluationOptions(first_panels=2, worst_panels=2)
@@ -150,13 +149,32 @@ class _Study:
         return {name: self._networks_of(name) for name in self.plan.train}
 
     def _networks_of(self, name: str) -> dict[str, Job]:
-        tasks = TASKS if name == self.plan.subject else tuple(task for task in TASKS if task != "regressor_f")
         jobs: dict[str, Job] = {}
-        for task in ("regressor", *(task for task in tasks if task != "regressor")):
-            jobs[task] = self._training_job(
-                name, task, name, self.plan.domains[name].steps.get(task), jobs.get("regressor")
-            )
+        for task in NETWORKS if name == self.plan.subject else NETWORKS[:-1]:
+            steps = self.plan.domains[name].steps.get(task)
+            jobs[task] = self._training_job(name, task, name, steps, jobs.get("regressor"))
+        if self.plan.forest and name == self.plan.subject:
+            jobs["rdf"] = self._forest_job(name, jobs["regressor"])
         return jobs
+
+    def _forest_job(self, name: str, regressor: Job) -> Job:
+        data, forest = self.training_data[name], PLANS[self.plan.preset]
+
+        def run(folder: Path) -> None:
+            _copy(regressor.folder, folder, "regressor")
+            forest_file(folder).unlink(missing_ok=True)  # of a run that was stopped before it said so
+            train_forest([data.source], folder, forest, self.plan.seed, self.device)
+
+        settings = {
+            "forest": asdict(forest),
+            "seed": self.plan.seed,
+            "data": data.key,
+            "regressor": regressor.key,
+        }
+        seconds = forest.frames * FRAME_SECONDS[False]
+        return make_job(
+            self.out / "networks", f"{name}-rdf", f"growing the forest on {name}", settings, seconds, run
+        )
 
     def _training_job(self, name: str, task: str, domain: str, steps: int | None, init: Job | None) -> Job:
         preset = self.presets.get(task) or find_preset(task, self.plan.preset)
@@ -197,17 +215,20 @@ class _Study:
         return {name: self._tuning_job(name) for name in self.plan.train if self._has_validation(name)}
 
     def _has_validation(self, name: str) -> bool:
-        return self.plan.domains[name].source is None and self.plan.domains[name].scenes.get("val", 0) > 0
+        domain = self.plan.domains[name]
+        if domain.source is None:
+            return domain.scenes.get("val", 0) > 0
+        return len(open_source(domain.source).validation_frames()) > 0
 
     def _tuning_job(self, name: str) -> Job:
         jobs, data, count = self.networks[name], self.training_data[name], self.plan.tuning_frames
 
         def run(folder: Path) -> None:
             collected = _collect(jobs, folder / "networks")
-            datasets = [StereoDataset(data.source, VALIDATION)]
-            frames = validation_frames(datasets, open_predictors(collected, self.device), count)
-            about = describe_tuning(frames, [Path(data.source)], "balanced")
-            Tuning(frames, folder / FILE_NAME, about).run(self._methods(name))
+            predictors = open_predictors(collected, self.device)
+            frames = validation_frames([open_source(data.source)], predictors, count)
+            about = describe_tuning(frames, [data.source], "balanced")
+            Tuning(frames, parameters_file(folder), about).run(self._methods(name))
 
         settings = {
             "networks": {task: job.key for task, job in jobs.items()},
@@ -225,7 +246,7 @@ class _Study:
         def run(name: str, folder: Path) -> None:
             _collect(self.networks[name], folder)
             if name in self.tuning:
-                write_bytes(folder / FILE_NAME, (self.tuning[name].folder / FILE_NAME).read_bytes())
+                write_bytes(parameters_file(folder), parameters_file(self.tuning[name].folder).read_bytes())
 
         return {
             name: make_job(
@@ -302,9 +323,15 @@ DATASET = "set"
 def _collect(networks: Mapping[str, Job], folder: Path) -> Path:
     """Put the networks of several folders into one."""
     for task, job in networks.items():
-        for suffix in (".safetensors", ".json"):
-            write_bytes(folder / f"{task}{suffix}", (job.folder / f"{task}{suffix}").read_bytes())
+        _copy(job.folder, folder, task)
     return folder
+
+
+def _copy(source: Path, target: Path, task: str) -> None:
+    """Copy a network or a forest, byte by byte."""
+    for path in (source / f"{task}.safetensors", source / f"{task}.json"):
+        if path.exists():  # a forest is one file
+            write_bytes(target / path.name, path.read_bytes())
 
 
 def _fingerprint(source: str, splits: tuple[str, ...]) -> str:

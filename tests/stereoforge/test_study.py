@@ -19,8 +19,9 @@ from stereoforge.errors import UsageError
 from stereoforge.study import DomainPlan, StudyPlan, StudyResult, read_plan, run_study
 from stereoforge.study.gap import Gap, gaps, summary
 from stereoforge.study.jobs import duration, make_job, run_jobs
+from stereoforge.study.plan import NETWORKS
 from tests.refine.worlds import toy_frame
-from training.presets import TASKS, Preset, find_preset
+from training.presets import Preset, find_preset
 
 SIZE = (128, 64)
 STEPS = {"regressor": 2, "regressor_f": 1, "confnet": 1, "gradnet": 1}
@@ -37,7 +38,7 @@ def tiny_presets() -> dict[str, Preset]:
             validation_interval=1,
             validation_samples=1,
         )
-        for task in TASKS
+        for task in NETWORKS
     }
 
 
@@ -50,7 +51,9 @@ def tiny_plan(**changes: Any) -> StudyPlan:
         test=tuple(names),
         size=SIZE,
         samples=1,
+        preset="tiny",
         fine_tuning_steps=1,
+        forest=True,
         methods=("regressor", "gradnet", "ours", "ours_conf_gt"),
     )
     return replace(plan, **changes)
