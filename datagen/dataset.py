@@ -25,6 +25,7 @@ from datagen.formats.png import read_png_size
 from datagen.layout import EYES, RENDER_PASSES, SPLITS, Direction, Eye, Layout
 from datagen.manifest import read_manifest
 from scenes import Scene, scene_from_json
+from scenes.assets import use_store
 
 
 @dataclass(frozen=True)
@@ -301,7 +302,8 @@ def open_layout(root: Path | str) -> Layout:
 
 
 def read_scene(path: Path) -> Scene:
-    """Read a Scene record. Raises DatasetError for a file that is missing or does not describe a scene."""
+    """Read a Scene record of a data set. Raises DatasetError for one that is missing or describes no scene."""
+    use_store(Layout(path.parents[3]).assets)
     try:
         return scene_from_json(path.read_text(encoding="utf-8"))
     except OSError as error:

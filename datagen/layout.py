@@ -118,6 +118,11 @@ class Layout:
         return self._group("manifest", split) / f"{_number(scene)}.json"
 
     @property
+    def assets(self) -> Path:
+        """The folder of the user's own files, prepared (`datagen.assets`)."""
+        return self.root / "assets"
+
+    @property
     def recipe(self) -> Path:
         return self.root / "recipe.yaml"
 

@@ -15,6 +15,7 @@ from datagen.curation import Curation
 from datagen.errors import DatasetError
 from datagen.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
+from scenes.assets import AssetPool
 from scenes.serialization import from_plain, to_plain
 from storage import write_text
 
@@ -36,6 +37,8 @@ class Recipe:
     gradient_threshold_px: float = 1.0
     """Jumps above this are discontinuities, masked out of the gradient targets."""
 
+    assets: AssetPool = field(default_factory=AssetPool)
+    """The user's own files; each belongs to one split only."""
     curriculum_scenes: int = 0
     """Over so many scenes of each split the worlds grow from few and simple to the family's own; 0 for none."""
     curation: Curation = field(default_factory=Curation)
@@ -66,11 +69,10 @@ class Recipe:
                 raise DatasetError(f"{name} must be at least 1, got {value}")
         if self.curriculum_scenes < 0:
             raise DatasetError(f"curriculum_scenes must not be negative, got {self.curriculum_scenes}")
-        if self.curriculum_scenes:
-            try:
-                self.world.at_complexity(0.0)
-            except ValueError as error:
-                raise DatasetError(str(error)) from error
+        try:
+            self.world.with_assets(self.assets).at_complexity(0.0 if self.curriculum_scenes else 1.0)
+        except ValueError as error:
+            raise DatasetError(str(error)) from error
         if self.seed < 0:
             raise DatasetError(f"the seed must not be negative, got {self.seed}")
 
@@ -87,7 +89,7 @@ class Recipe:
         """The index-th scene of a split; splits, scenes and attempts draw from unrelated random streams."""
         key = (SPLITS.index(split), index) + ((attempt,) if attempt else ())
         sequence = np.random.SeedSequence(self.seed, spawn_key=key)
-        world = self.world
+        world = self.world.with_assets(self.assets.of_split(split))
         if index < self.curriculum_scenes:
             world = world.at_complexity(index / self.curriculum_scenes)
         return sample_scene(np.random.default_rng(sequence), self.family, world)

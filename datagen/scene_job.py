@@ -32,6 +32,7 @@ from datagen.manifest import SceneManifest, file_entry, write_manifest
 from datagen.recipe import Recipe
 from datagen.scene_geometry import SceneGeometry
 from scenes import Scene, scene_to_json
+from scenes.assets import UserEnvironment, UserMesh, UserTexture, use_store
 from storage import write_text
 
 STAGING_FOLDER = ".staging"
@@ -73,6 +74,7 @@ def render_scene(job: SceneJob) -> SceneManifest:
 
 def _render_staged(job: SceneJob, watch: Stopwatch) -> SceneManifest:
     """Render the first attempt at the scene that is not degenerate."""
+    use_store(Layout(job.root).assets)
     rejected: Counter[str] = Counter()
     for attempt in range(job.recipe.curation.attempts):
         with watch.step("sample"):
@@ -80,7 +82,8 @@ def _render_staged(job: SceneJob, watch: Stopwatch) -> SceneManifest:
             fault = fault_before_rendering(geometry, job.recipe.curation)
         frames = None if fault else _render_attempt(job, geometry, watch)
         if frames is not None:
-            return _commit(job, watch, _scene_statistics(geometry.scene, frames, rejected))
+            statistics = _scene_statistics(geometry.scene, frames, rejected)
+            return _commit(job, watch, statistics | {"assets": _assets_used(job.recipe, geometry.scene)})
         rejected[fault or TEXTURELESS] += 1
     reasons = ", ".join(f"{reason} ({count})" for reason, count in rejected.most_common())
     raise DatasetError(
@@ -161,6 +164,18 @@ def _scene_statistics(scene: Scene, frames: list[dict[str, float]], rejected: Co
     """Counts, the means over the frames of what was measured in the left eye, and what was rejected why."""
     means = {key: round(float(np.mean([frame[key] for frame in frames])), 5) for key in frames[0]}
     return {"objects": len(scene.objects), "frames": scene.frames, **means, "rejected": dict(rejected)}
+
+
+def _assets_used(recipe: Recipe, scene: Scene) -> list[str]:
+    """The names of the user's own files in a scene."""
+    own = (
+        *(thing.shape for thing in scene.objects),
+        *(material.color for material in scene.materials),
+        scene.world.environment,
+    )
+    used = {item.sha256 for item in own if isinstance(item, UserMesh | UserTexture | UserEnvironment)}
+    pool = recipe.assets
+    return sorted(a.name for a in (*pool.meshes, *pool.textures, *pool.environments) if a.sha256 in used)
 
 
 def _commit(job: SceneJob, watch: Stopwatch, statistics: dict[str, Any]) -> SceneManifest:

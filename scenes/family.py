@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from scenes.assets import AssetPool
 from scenes.spec import Scene
 
 
@@ -21,6 +22,12 @@ class FamilyConfig:
     """Image height, pixels."""
     frames: int = 1
     """Frames per scene."""
+
+    def with_assets(self, assets: AssetPool) -> Self:
+        """This config drawing from the user's files too. Raises ValueError for a family that does not."""
+        if not assets:
+            return self
+        raise ValueError(f"{type(self).__name__} makes no use of own meshes, textures and environments")
 
     def at_complexity(self, complexity: float) -> Self:
         """This config made simpler: fewer and plainer things at 0, as it is at 1 (for curricula).

@@ -20,6 +20,7 @@ from cattrs.v import format_exception
 import scenes.deformations
 import scenes.shapes
 import scenes.textures
+from scenes.assets import USER_SHAPES, USER_TEXTURES
 from scenes.family import FamilyConfig
 from scenes.registry import FAMILIES
 from scenes.spec import Deformation, Light, Scene, Shape, Texture
@@ -52,8 +53,8 @@ def _make_converter() -> Converter:
         is_dataclass,
         lambda cls: make_dict_structure_fn(cls, converter, _cattrs_forbid_extra_keys=True),
     )
-    _tagged(converter, Shape, scenes.shapes.SHAPES)
-    _tagged(converter, Texture, scenes.textures.TEXTURES)
+    _tagged(converter, Shape, scenes.shapes.SHAPES | USER_SHAPES)
+    _tagged(converter, Texture, scenes.textures.TEXTURES | USER_TEXTURES)
     _tagged(converter, Deformation, scenes.deformations.DEFORMATIONS)
     _tagged(converter, FamilyConfig, {name: kind.config for name, kind in FAMILIES.items()}, tag="family")
     configure_tagged_union(Light, converter, tag_name="kind")

@@ -10,8 +10,9 @@ import numpy as np
 from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
-from datagen.blender.materials import build_material, image_from_array
+from datagen.blender.materials import build_material, image_from_array, image_from_radiance
 from datagen.scene_geometry import SceneGeometry
+from scenes.assets import UserEnvironment
 from scenes.mesh import Mesh
 from scenes.spec import AreaLight, Light, Scene, StereoCamera, SunLight, World
 
@@ -128,7 +129,11 @@ def _build_environment(world: World, blender_scene: bpy.types.Scene) -> None:
     nodes, links = block.node_tree.nodes, block.node_tree.links
     nodes.clear()
     texture = nodes.new("ShaderNodeTexEnvironment")
-    texture.image = image_from_array("environment", world.environment.image())
+    environment = world.environment
+    if isinstance(environment, UserEnvironment):
+        texture.image = image_from_radiance("environment", environment.radiance())
+    else:
+        texture.image = image_from_array("environment", environment.image())
     background = nodes.new("ShaderNodeBackground")
     background.inputs["Strength"].default_value = world.strength
     output = nodes.new("ShaderNodeOutputWorld")

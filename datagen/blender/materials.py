@@ -11,13 +11,26 @@ from scenes.spec import Material
 
 def image_from_array(name: str, pixels: NDArray[np.uint8]) -> bpy.types.Image:
     """A Blender image with the given sRGB pixels, (H, W, 3) uint8, row 0 at the top."""
-    height, width, _ = pixels.shape
-    image = bpy.data.images.new(name, width, height, alpha=False)
+    image = bpy.data.images.new(name, pixels.shape[1], pixels.shape[0], alpha=False)
+    _set_pixels(image, pixels.astype(np.float32) / 255.0)
+    return image
+
+
+def image_from_radiance(name: str, radiance: NDArray[np.float32]) -> bpy.types.Image:
+    """A Blender image of linear RGB, (H, W, 3) of any range, row 0 at the top."""
+    image = bpy.data.images.new(
+        name, radiance.shape[1], radiance.shape[0], alpha=False, float_buffer=True, is_data=True
+    )
+    _set_pixels(image, radiance)
+    return image
+
+
+def _set_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> None:
+    height, width, _ = values.shape
     rgba = np.ones((height, width, 4), np.float32)
-    rgba[:, :, :3] = pixels[::-1].astype(np.float32) / 255.0
+    rgba[:, :, :3] = values[::-1]
     image.pixels.foreach_set(rgba.ravel())
     image.update()
-    return image
 
 
 def build_material(name: str, material: Material) -> bpy.types.Material:

@@ -8,12 +8,13 @@ of a rig with a small baseline look like those of one with a large baseline.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from scenes.assets import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture
 from scenes.drawing import Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.family import Family, FamilyConfig
 from scenes.lights import sample_area_light, sample_sun
@@ -31,6 +32,7 @@ from scenes.spec import (
     Shape,
     StereoCamera,
     SunLight,
+    Texture,
     Trajectory,
     World,
 )
@@ -86,8 +88,19 @@ class FlyingThingsConfig(FamilyConfig):
     defocus: Range = (0.0, 0.008)
     """Diameter of the final pass's blur of the horizon, as a share of the image width."""
 
+    user_share: float = 0.5
+    """Share of the flying objects, of their textures and of the skies that are the user's own, where given."""
+    assets: AssetPool = field(default_factory=AssetPool)
+    """The user's own files; filled in from the recipe's, for each split its own."""
     complexity: float = 1.0
     """0 few things of plain shapes, 1 as many and as complicated as the other ranges say."""
+
+    def with_assets(self, assets: AssetPool) -> FlyingThingsConfig:
+        return replace(self, assets=assets)
+
+    def draws_own(self, rng: np.random.Generator, among: tuple[Asset, ...]) -> Asset | None:
+        """One of the user's files of a kind, or None for one of the generator's own; draws only if there are any."""
+        return choose(rng, among) if among and chance(rng, self.user_share) else None
 
     def at_complexity(self, complexity: float) -> FlyingThingsConfig:
         return replace(self, complexity=complexity * self.complexity)
@@ -176,7 +189,7 @@ def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -
         objects=(ground, *background, *flyers),
         materials=tuple(materials),
         lights=_lights(rng, rig),
-        world=World(Sky.sample(rng, 1024), uniform(rng, *config.sky_strength)),
+        world=World(_environment(rng, config), uniform(rng, *config.sky_strength)),
         exposure_key=uniform(rng, 0.18, 0.32),
         notes={"flying_objects": float(len(flyers)), "background_objects": float(len(background))},
         final=_final(rng, rig),
@@ -301,9 +314,21 @@ def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Ma
     for index in range(count):
         cover = min(each * math.exp(rng.normal(-0.1, 0.5)), 0.12)
         size_px = math.sqrt(cover * rig.camera.width * rig.camera.height / _SHAPE_FILL)
-        materials.append(sample_material(rng, size_px))
+        materials.append(_flyer_material(rng, rig.config, size_px))
         flyers.append(_flyer(rng, rig, f"flying {index}", len(materials) - 1, size_px, land.level_m))
     return flyers
+
+
+def _flyer_material(rng: np.random.Generator, config: FlyingThingsConfig, size_px: float) -> Material:
+    material = sample_material(rng, size_px)
+    own = config.draws_own(rng, config.assets.textures)
+    return material if own is None else replace(material, color=UserTexture(own.sha256))
+
+
+def _environment(rng: np.random.Generator, config: FlyingThingsConfig) -> Texture:
+    sky = Sky.sample(rng, 1024)
+    own = config.draws_own(rng, config.assets.environments)
+    return sky if own is None else UserEnvironment(own.sha256)
 
 
 def _flyer(
@@ -312,6 +337,8 @@ def _flyer(
     """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth."""
     config = rig.config
     shape = _sample_shape(rng, {name: share * (1 - config.complexity) for name, share in _PLAIN.items()})
+    if own := config.draws_own(rng, config.assets.meshes):
+        shape = UserMesh(own.sha256)
     stretch = rng.uniform(0.8, 1.25, 3)
     near_share = config.disparity_share[1]
     depth_m = rig.depth(uniform(rng, min(0.15 * near_share, near_share), near_share))

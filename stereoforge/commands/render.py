@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dataset
+from datagen.assets import import_assets
 from datagen.estimate import estimate_run
-from datagen.layout import EXTRA_TARGETS
+from datagen.layout import EXTRA_TARGETS, Layout
 from datagen.manifest import SceneManifest
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
@@ -57,6 +60,12 @@ class Render:
     """Render only scenes I, I + N, I + 2N, ..., so that N machines can share a folder."""
     recipe: Annotated[Path | None, shown("FILE", "none")] = None
     """A recipe.yaml to render."""
+    meshes: Annotated[Path | None, shown("DIR", "none")] = None
+    """Your own OBJ, PLY, GLB and STL files, to fly among the generated things; each is used in one split only."""
+    textures: Annotated[Path | None, shown("DIR", "none")] = None
+    """Your own pictures, to paint things with."""
+    environments: Annotated[Path | None, shown("DIR", "none")] = None
+    """Your own equirectangular HDR and EXR pictures, to light the worlds."""
     dry_run: bool = False
     """Say what would be rendered, how long it would take and how much disk, measured on one frame of one
     scene; nothing is written."""
@@ -65,6 +74,8 @@ class Render:
         recipe = self._recipe()
         if self.workers is not None and self.workers < 1:
             raise UsageError(f"--workers must be at least 1, got {self.workers}")
+        if self.meshes or self.textures or self.environments:
+            recipe = self._with_assets(recipe)
         if self.dry_run:
             self._estimate(recipe)
             return
@@ -76,6 +87,24 @@ class Render:
             for scene, reason in summary.failures:
                 console.print(f"  {scene}: {reason}", markup=False)
             raise CommandError(f"{len(summary.failures)} scenes of {self.out} could not be rendered")
+
+    def _with_assets(self, recipe: Recipe) -> Recipe:
+        """Prepare the user's own files into the data set's folder and add them to the recipe."""
+        if self.dry_run:
+            raise UsageError("--dry-run reads no --meshes, --textures or --environments: leave them out")
+        with tempfile.TemporaryDirectory(prefix="stereoforge-assets-") as prepared:
+            imported = import_assets(
+                Path(prepared), meshes=self.meshes, textures=self.textures, environments=self.environments
+            )
+            for sentence in imported.skipped:
+                console.print(f"skipped {sentence}", markup=False)
+            try:
+                recipe = replace(recipe, assets=imported.pool)
+            except DatasetError as error:
+                raise UsageError(str(error)) from error
+            render_dataset(replace(recipe, scenes={}), self.out)  # Claims the folder, or refuses it.
+            shutil.copytree(prepared, Layout(self.out).assets, dirs_exist_ok=True)
+        return recipe
 
     def _estimate(self, recipe: Recipe) -> None:
         found = estimate_run(recipe, self.out, device=self.device, shard=parse_shard(self.shard))
