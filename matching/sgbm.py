@@ -63,7 +63,7 @@ def match_sgbm(
         left, right: (H, W, 3) uint8, rectified.
 
     Returns:
-        (H, W) float32 pixels, multiples of 1/16; NaN where the matcher finds no unique match.
+        (H, W) float32 pixels, multiples of 1/16; NaN where the matcher finds no unique match inside the right image.
 
     Raises:
         ValueError: If the images differ in shape or are not (H, W, 3) of uint8.
@@ -96,7 +96,10 @@ def match_sgbm(
     steps = matcher.compute(*padded)[
         margin : margin + left.shape[0], disparities : disparities + left.shape[1]
     ]
-    return np.where(steps < 0, np.nan, steps / np.float32(SUBPIXELS)).astype(np.float32)
+    disparity = steps / np.float32(SUBPIXELS)
+    # What is found among the columns put before the right image is no match.
+    found = (steps >= 0) & (disparity < np.arange(1, left.shape[1] + 1))
+    return np.where(found, disparity, np.nan).astype(np.float32)
 
 
 def match_both(

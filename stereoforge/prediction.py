@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from datagen import StereoSample
 from datagen.frame import StereoFrame
-from matching import SGBMParameters, left_right_consistency, match_both
+from matching import SGBMParameters, fill_background, left_right_consistency, match_both
 from refine.evaluation import EvaluationFrame
 from refine.forest import Forest, load_forest
 from refine.handmade import consistency_confidence, local_slopes
@@ -56,17 +56,17 @@ class MatchingPredictor:
         return self.judge(left, disparity, disparity_right)
 
     def judge(self, left: Image, disparity: Map, disparity_right: Map) -> Prediction:
-        """Confidence and gradients by the networks there are, else by hand."""
-        judged = Prediction(disparity, None, None)
+        """Confidence and gradients by the networks there are, else by hand; holes are filled from the background."""
+        confidence = gradient = None
         if self.networks is not None:
             judged = self.networks.predict(left, disparity, disparity_right)
-        confidence, gradient = judged.confidence, judged.gradient
+            confidence, gradient = judged.confidence, judged.gradient
         if confidence is None:
             consistency = left_right_consistency(disparity, disparity_right)
             confidence = consistency_confidence(disparity, consistency, left)
         if gradient is None:
             gradient = local_slopes(disparity, confidence, left)
-        return Prediction(judged.disparity, confidence, gradient)
+        return Prediction(fill_background(disparity), confidence, gradient)
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,10 @@ def test_sgbm_matches_up_to_the_left_border(pair):
     inside = np.arange(160) - pair.disparity_left >= 0
     border = inside & (np.arange(160) < 32)
     assert np.isfinite(got[border]).mean() > 0.7
+    noise = np.random.default_rng(0).integers(0, 256, (2, 40, 90, 3), np.uint8)
+    found = match_sgbm(*noise, SGBMParameters(max_disparity_px=64, uniqueness_percent=0, speckle_px=0))
+    assert np.isfinite(found).any()
+    assert (np.nan_to_num(found) < np.arange(90) + 1).all()
 
 
 def test_sgbm_refuses_what_it_cannot_match(pair):
