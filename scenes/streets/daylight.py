@@ -75,7 +75,7 @@ def _dusk(rng: np.random.Generator) -> Daylight:
         sky,
         zenith=shade(uniform(rng, 0.3, 0.45), 0.08, uniform(rng, 250.0, 285.0)),
         horizon=shade(uniform(rng, 0.65, 0.8), uniform(rng, 0.05, 0.13), warm),
-        cloud=shade(uniform(rng, 0.5, 0.7), 0.05, uniform(rng, 10.0, 320.0)),
+        cloud=shade(uniform(rng, 0.5, 0.7), 0.05, uniform(rng, -70.0, 60.0)),
         cloud_cover=uniform(rng, 0.1, 0.8),
         glow=uniform(rng, 0.0, 0.5),
     )

@@ -16,8 +16,12 @@ from datagen.layout import EYES, Eye
 from scenes import FAMILIES, Scene, sample_scene
 from tests.datagen.oracle import cast_depth
 
-SIZES = ((240, 136), (160, 90))
-SCENES_PER_SIZE = 5
+SCENES: dict[str, tuple[tuple[int, int, int], ...]] = {
+    "flying_things": ((240, 136, 5), (160, 90, 5)),
+}
+"""Width, height and number of the scenes of a family."""
+OTHER_SCENES = ((240, 136, 2), (160, 90, 2))
+"""Of the families that are not named above."""
 
 
 @dataclass(frozen=True)
@@ -35,14 +39,14 @@ class World:
         return camera.disparity_metres / depth
 
 
-@pytest.fixture(scope="module")
-def worlds(tmp_path_factory: pytest.TempPathFactory) -> list[World]:
-    """Ten random scenes; their triangles are Blender's own evaluated meshes."""
+@pytest.fixture(scope="module", params=sorted(FAMILIES))
+def worlds(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> list[World]:
+    """Random scenes of a family; their triangles are Blender's own evaluated meshes."""
     made = []
-    for width, height in SIZES:
-        for seed in range(SCENES_PER_SIZE):
-            config = FAMILIES["flying_things"].config(width=width, height=height)
-            scene = sample_scene(np.random.default_rng([seed, width]), "flying_things", config)
+    for width, height, count in SCENES.get(request.param, OTHER_SCENES):
+        for seed in range(count):
+            config = FAMILIES[request.param].config(width=width, height=height)
+            scene = sample_scene(np.random.default_rng([seed, width]), request.param, config)
             frames = render_frames(scene, tmp_path_factory.mktemp("blender"), RenderOptions(samples=4))
             _, targets = next(frames)
             from datagen.blender.geometry import evaluated_triangles
@@ -143,7 +147,10 @@ def test_occlusion_agrees_with_the_other_eyes_disparity(worlds: list[World], eye
         visible_agrees.append(same[own.occlusion == VISIBLE])
         occluded_agrees.append(nearer[own.occlusion == OCCLUDED])
     assert np.concatenate(visible_agrees).mean() > 0.99
-    assert np.concatenate(occluded_agrees).mean() > 0.99
+    # What hides a point may be thinner than a pixel and lie between the centres that are compared here:
+    # leaves and fences, which only some families are full of.
+    thin = worlds[0].scene.family != "flying_things"
+    assert np.concatenate(occluded_agrees).mean() > (0.97 if thin else 0.99)
 
 
 def test_scratch_folder_is_left_clean(tmp_path: Path) -> None:
