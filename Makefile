@@ -1,5 +1,6 @@
 # make demo    everything at small scale, from nothing to a report      make test    the whole test suite
 # make install only the environment                                     make check   lint, types, import rules
+# make study   the numbers in results/ again, hours: recipes/study.yaml
 #
 # All of them set up .venv first, from pinned versions. A machine with a GPU can bring its own torch:
 # make install PIP_FLAGS="--index-url ..." CONSTRAINTS=/dev/null
@@ -10,16 +11,21 @@ PIP_FLAGS ?=
 # A file's tests share what they render, so a file stays with one process.
 PYTEST_FLAGS ?= -n auto --dist loadfile
 DEMO ?= demo
+STUDY ?= study
 BIN := .venv/bin
 # What Blender's library wants from the system, where it is not there already (Debian's names).
 BLENDER_LIBRARIES := libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libxext6 libsm6 libice6 libgl1
 
-.PHONY: install demo test check clean
+.PHONY: install demo study test check clean
 
 install: .venv/.installed
 
 demo: .venv/.installed
 	$(BIN)/stereoforge demo --out $(DEMO)
+
+study: .venv/.installed
+	$(BIN)/stereoforge study --plan recipes/study.yaml --out $(STUDY)
+	rm -rf results && cp -R $(STUDY)/results results
 
 test: .venv/.installed-dev
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(PYTEST_FLAGS)

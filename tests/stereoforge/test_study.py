@@ -113,6 +113,16 @@ def test_a_plan_survives_its_file(tmp_path: Path) -> None:
     assert read_plan(path) == plan
 
 
+def test_the_shipped_plan_can_be_rendered() -> None:
+    plan = read_plan(Path(__file__).parents[2] / "recipes" / "study.yaml")
+    for name in plan.test:
+        recipe = plan.recipe(name, ("train", "test"))
+        assert (recipe.world.width, recipe.world.height, recipe.seed) == (*plan.size, plan.seed)
+        assert recipe.scenes["test"] * recipe.world.frames >= 100
+    assert plan.subject == "flying_things"
+    assert plan.recipe("flying_things", ("train",)).scenes["train"] * 4 >= 2000
+
+
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
