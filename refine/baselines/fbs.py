@@ -35,9 +35,9 @@ class FBS(Method):
     needs: ClassVar[frozenset[str]] = frozenset({"confidence"})
     search: ClassVar = {
         "smoothness": (2.0, 8.0, 32.0, 128.0, 512.0),
-        "sigma_spatial_px": (4.0, 8.0, 16.0, 32.0),
-        "sigma_luma": (2.0, 4.0, 8.0, 16.0),
-        "sigma_chroma": (2.0, 4.0, 8.0, 16.0),
+        "sigma_spatial_px": (2.0, 4.0, 8.0, 16.0, 32.0),
+        "sigma_luma": (2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
+        "sigma_chroma": (2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
         "confidence_floor": (1e-5, 1e-4, 1e-3, 3e-3, 1e-2),
     }
 

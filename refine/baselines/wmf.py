@@ -29,7 +29,7 @@ class WMF(Method):
 
     name: ClassVar[str] = "wmf"
     label: ClassVar[str] = "Weighted median"
-    search: ClassVar = {"radius_px": (3, 5, 7, 10, 15), "sigma": (2.5, 5.0, 10.0, 25.5, 50.0)}
+    search: ClassVar = {"radius_px": (3, 5, 7, 10, 15), "sigma": (2.5, 5.0, 10.0, 25.5, 50.0, 100.0)}
 
     radius_px: int = 7
     """The window has 2 radius + 1 pixels a side; smaller at the image's borders. Not given in the paper (ours)."""
