@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,6 +22,7 @@ from viewing import (
     disparity_picture,
     gradient_picture,
     index_picture,
+    normals_picture,
     occlusion_picture,
     render_page,
     shrunk,
@@ -35,6 +36,10 @@ LONGEST_SIDE_PX = 480
 """Pictures in the page are not larger; a gallery of 24 scenes then stays below 10 MB."""
 FULL_COLOR_GRADIENT = 0.25
 """Gradient, px a pixel, that is drawn in full colour."""
+FULL_COLOR_FLOW = 0.025
+"""Flow, as a share of the image width, that is drawn in full colour."""
+FULL_COLOR_CHANGE = 0.005
+"""Change of disparity, as a share of the image width, that is drawn brightest."""
 MEASURED_FRAMES = 100
 """Statistics are of at most so many frames of each split, evenly spaced."""
 
@@ -81,7 +86,7 @@ def write_gallery(
     shown = evenly_spaced(
         [sample for dataset in datasets.values() for sample in _first_frames(dataset)], scenes
     )
-    tick = _Ticker(sum(map(len, measured.values())) + len(shown), progress)
+    tick = Ticker(sum(map(len, measured.values())) + len(shown), progress)
     statistics = {split: measure(map(tick, samples)) for split, samples in measured.items()}
     nearest = max(float(np.percentile(one.disparity, 99.9)) for one in statistics.values())
     nearest = max(nearest, 1.0)
@@ -91,7 +96,7 @@ def write_gallery(
         title=layout.root.resolve().name,
         lead=_lead(recipe, datasets),
         tiles=_tiles(layout, statistics, splits),
-        plots=[svg(figure) for figure in _plots(statistics)],
+        plots=[svg(figure) for figure in histograms(statistics)],
         measured=sum(map(len, statistics.values())),
         keys=_keys(nearest),
         nearest_px=round(nearest),
@@ -100,7 +105,7 @@ def write_gallery(
         out_of_frame_color=OUT_OF_FRAME_COLOR,
         texture_window=TEXTURE_WINDOW_PX,
         texture_deviation=TEXTURE_DEVIATION,
-        panels=[_panel(tick(sample), nearest) for sample in shown],
+        panels=[_panel(tick(sample), recipe, nearest) for sample in shown],
         finished=sum(len(layout.committed_scenes(split)) for split in splits),
         facts=_facts(
             recipe, read_manifest(layout.manifest(splits[0], layout.committed_scenes(splits[0])[0]))
@@ -116,7 +121,7 @@ def evenly_spaced(items: Sequence[T], count: int) -> list[T]:
     return [items[int(index)] for index in np.linspace(0, len(items) - 1, count).round()]
 
 
-class _Ticker:
+class Ticker:
     """Passes samples through and reports how many have been."""
 
     def __init__(self, total: int, progress: Callable[[int, int], None] | None) -> None:
@@ -136,7 +141,7 @@ def _first_frames(dataset: StereoDataset) -> list[StereoSample]:
     return list(first.values())
 
 
-def _panel(sample: StereoSample, nearest_px: float) -> FramePanel:
+def _panel(sample: StereoSample, recipe: Recipe, nearest_px: float) -> FramePanel:
     low, middle, high = np.percentile(sample.disparity_left, (1, 50, 99))
     hidden = (sample.occlusion_left > 0).mean()
     objects = np.count_nonzero(np.unique(sample.object_index_left))
@@ -146,6 +151,7 @@ def _panel(sample: StereoSample, nearest_px: float) -> FramePanel:
         ("Not visible to the right eye", occlusion_picture(sample.occlusion_left, sample.left), 85),
         ("Disparity gradient", gradient_picture(gradient, FULL_COLOR_GRADIENT), 90),
         ("Objects", index_picture(_thinned(sample.object_index_left)), None),
+        *_extra_pictures(sample, recipe),
     )
     return FramePanel(
         name=sample.name,
@@ -157,6 +163,33 @@ def _panel(sample: StereoSample, nearest_px: float) -> FramePanel:
         right=_small(sample.right),
         targets=tuple((name, _small(picture), quality) for name, picture, quality in pictures),
     )
+
+
+def _extra_pictures(sample: StereoSample, recipe: Recipe) -> list[tuple[str, Picture, int | None]]:
+    """What the recipe asked for beyond the basic targets: the other pass, then surfaces, then motion."""
+    pictures: list[tuple[str, Picture, int | None]] = [
+        (f"The {name} pass", replace(sample, render_pass=name).left, 82)
+        for name in recipe.passes
+        if name != sample.render_pass
+    ]
+    if "normals" in recipe.targets:
+        pictures.append(("Surface normals", normals_picture(sample.normals("left")), 90))
+    if "material_index" in recipe.targets:
+        pictures.append(("Materials", index_picture(_thinned(sample.material_index("left"))), None))
+    if "optical_flow" in recipe.targets:
+        full_px = FULL_COLOR_FLOW * sample.size[1]
+        flow = gradient_picture(sample.flow("left", "into_future"), full_px)
+        pictures.append((f"Flow to the next frame, full colour {full_px:.0f} px", flow, 90))
+    if "disparity_change" in recipe.targets:
+        change = np.abs(sample.disparity_change("left", "into_future"))
+        full_px = FULL_COLOR_CHANGE * sample.size[1]
+        pictures.append(
+            (f"Change of disparity, brightest {full_px:.1f} px", disparity_picture(change, full_px), 90)
+        )
+    if "motion_boundaries" in recipe.targets:
+        marked = sample.motion_boundaries("left", "into_future").astype(np.uint8)
+        pictures.append(("Motion boundaries", occlusion_picture(marked, sample.left), 85))
+    return pictures
 
 
 def _small(picture: Picture) -> Picture:
@@ -192,8 +225,8 @@ def _tiles(layout: Layout, statistics: dict[str, SetStatistics], splits: list[st
     return [{"value": value, "label": label} for value, label in values]
 
 
-def _plots(statistics: dict[str, SetStatistics]) -> list[Any]:
-    """Histograms of the disparity over pixels and of the other quantities over frames, a line a split."""
+def histograms(statistics: dict[str, SetStatistics]) -> list[Any]:
+    """Histograms of the disparity over pixels and of the other quantities over frames, a line for each name."""
     nearest = max(float(np.percentile(one.disparity, 99.9)) for one in statistics.values())
     edges = np.linspace(0, max(nearest, 1.0), 61)
     figures = [

@@ -91,7 +91,8 @@ def occlusion_picture(labels: ArrayLike, image: ArrayLike) -> Picture:
 def gradient_picture(gradient: ArrayLike, maximum: float = 0.5) -> Picture:
     """Disparity gradient: hue is its direction, white a fronto-parallel surface, full colour `maximum`.
 
-    Red points to the right (disparity grows along x), green-yellow down, cyan left, violet up.
+    Red points to the right (disparity grows along x), green-yellow down, cyan left, violet up. The same wheel
+    shows optical flow, which is a field of (right, down) too.
 
     Args:
         gradient: (H, W, 2) as [dx, dy], in pixels of disparity a pixel, NaN where invalid.
@@ -107,6 +108,13 @@ def gradient_picture(gradient: ArrayLike, maximum: float = 0.5) -> Picture:
     hue = (np.arctan2(dy, dx) / (2 * np.pi)) % 1.0
     saturation = np.clip(np.hypot(dx, dy) / maximum, 0, 1)
     return _with_invalid(_hsv_colors(hue, saturation, 1 - 0.15 * saturation), invalid)
+
+
+def normals_picture(normals: ArrayLike) -> Picture:
+    """Surface normals (H, W, 3), x right, y up, z towards the eye: -1..1 as red, green, blue; the sky dark."""
+    values = _image(normals, "normals")
+    nothing = ~values.any(axis=2, keepdims=True)
+    return _rounded(np.where(nothing, 38.0, 127.5 * (values + 1)))
 
 
 def index_picture(index: ArrayLike) -> Picture:

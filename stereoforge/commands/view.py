@@ -15,7 +15,10 @@ from stereoforge.values import shown
 
 @dataclass(frozen=True)
 class View:
-    """Write a gallery of a data set, with statistics: one HTML file that opens from disk."""
+    """Write a gallery of a data set, with statistics: one HTML file that opens from disk.
+
+    With --compare, the statistics of two data sets side by side instead.
+    """
 
     data: Annotated[tyro.conf.Positional[Path], shown("DIR")]
     """Folder of the data set."""
@@ -23,18 +26,23 @@ class View:
     """The file to write."""
     scenes: Annotated[int, shown("N")] = 24
     """How many scenes to show, evenly spread."""
+    compare: Annotated[Path | None, shown("DIR", "none")] = None
+    """Another data set, to put its statistics beside this one's."""
 
     def run(self) -> None:
         if self.scenes < 1:
             raise UsageError(f"--scenes must be at least 1, got {self.scenes}")
+        from datagen.comparison import write_comparison
         from datagen.gallery import write_gallery
 
         with progress_bar() as progress:
             task = progress.add_task("reading", total=None)
-            write_gallery(
-                self.data,
-                self.out,
-                scenes=self.scenes,
-                progress=lambda done, total: progress.update(task, completed=done, total=total),
-            )
+
+            def show(done: int, total: int) -> None:
+                progress.update(task, completed=done, total=total)
+
+            if self.compare is None:
+                write_gallery(self.data, self.out, scenes=self.scenes, progress=show)
+            else:
+                write_comparison(self.data, self.compare, self.out, scenes=self.scenes, progress=show)
         console.print(f"{self.out}: {self.out.stat().st_size / 1e6:.1f} MB")

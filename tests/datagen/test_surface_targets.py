@@ -12,6 +12,7 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
 from datagen import DatasetError, Recipe, StereoDataset, StereoSample, render_dataset
+from datagen.gallery import write_gallery
 from datagen.layout import DIRECTIONS, EXTRA_TARGETS, EYES, Direction, Eye
 from datagen.raycast import SceneRayCaster
 from datagen.scene_geometry import SceneGeometry
@@ -296,3 +297,11 @@ def test_unknown_targets_are_refused() -> None:
     world = FAMILIES["flying_things"].config()
     with pytest.raises(DatasetError, match=r"targets must be among material_index.*'albedo'"):
         Recipe(world, {"train": 1}, targets=("albedo",))
+
+
+def test_the_gallery_shows_the_targets_on_request(dataset: Path, tmp_path: Path) -> None:
+    write_gallery(dataset, tmp_path / "gallery.html")
+    page = (tmp_path / "gallery.html").read_text()
+    for caption in ("Surface normals", "Materials", "Flow to the next frame", "Change of disparity"):
+        assert caption in page
+    assert "Motion boundaries" in page
