@@ -18,6 +18,7 @@ DEBUG_FLAG = "--debug"
 MISSING_PARTS = {
     "bpy": "rendering needs Blender: pip install 'stereoforge[render]' on Python 3.11 (bpy 4.5) or 3.13 (bpy 5.2)",
     "torch": "networks need PyTorch: pip install torch, then pip install 'stereoforge[train]'",
+    "onnxruntime": "ONNX needs its runtime: pip install 'stereoforge[onnx]'",
     "pytorch_lightning": "training needs Lightning: pip install 'stereoforge[train]'",
 }
 

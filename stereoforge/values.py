@@ -27,11 +27,11 @@ def shown_duration(seconds: float) -> str:
     return f"{minutes} min {whole % 60} s" if minutes else f"{whole} s"
 
 
-def parse_size(text: str) -> tuple[int, int]:
-    """(width, height) of "960x540"."""
+def parse_size(text: str, flag: str = "size") -> tuple[int, int]:
+    """(width, height) of "960x540"; `flag` names the flag in errors."""
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
     if not match or 0 in (sizes := (int(match[1]), int(match[2]))):
-        raise UsageError(f"--size takes WIDTHxHEIGHT in pixels, such as 960x540, not {text!r}")
+        raise UsageError(f"--{flag} takes WIDTHxHEIGHT in pixels, such as 960x540, not {text!r}")
     return sizes
 
 

@@ -23,29 +23,35 @@ from training.tasks import StereoTask
 class BestWeights(pl.Callback):
     """Hands the network over for saving whenever its validation figure is the best so far.
 
-    Without validation frames the latest weights are the best. The figure to beat is part of the checkpoint, so a
-    resumed run goes on comparing.
+    Without validation frames, or where they have no truth for the figure, the latest weights are the best. The
+    figure to beat is part of the checkpoint, so a resumed run goes on comparing.
     """
 
     def __init__(self, save: Callable[[int, dict[str, float]], None]) -> None:
         """save: called with the steps done and the validation figures."""
         self._save = save
         self._best = math.inf
+        self._step = 0
 
     def on_train_epoch_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:
+        if trainer.global_step == self._step:
+            return  # Lightning ends the checkpoint's epoch once more after resuming, without validating
+        self._step = trainer.global_step
         figures = validation_figures(trainer)
         value = figures.get(pl_module.monitor.removeprefix("validation/"))
-        if value is not None and not value < self._best:
+        if value is None or math.isnan(value):  # nothing to measure: the latest weights are the best
+            value = math.inf
+        elif not value < self._best:
             return
-        self._best = math.inf if value is None else value
+        self._best = value
         if trainer.is_global_zero:
             self._save(trainer.global_step, figures)
 
     def state_dict(self) -> dict[str, Any]:
-        return {"best": self._best}
+        return {"best": self._best, "step": self._step}
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
-        self._best = state_dict["best"]
+        self._best, self._step = state_dict["best"], state_dict["step"]
 
 
 class RunProgress(pl.Callback):
@@ -68,6 +74,8 @@ class RunProgress(pl.Callback):
         self._title = title
 
     def on_train_start(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002
+        if not trainer.is_global_zero:
+            self._console.quiet = True
         self._bar = self._progress.add_task(
             self._title, total=trainer.max_steps, completed=trainer.global_step, loss=math.nan
         )

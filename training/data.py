@@ -31,6 +31,7 @@ from training.augmentation import (
 )
 from training.errors import TrainingError
 from training.presets import Preset
+from training.provenance import data_fingerprint
 
 DEFAULT_CACHE_BYTES = 2 << 30
 IMAGE_MEAN_FRAMES = 100
@@ -46,6 +47,8 @@ class Source:
 
     frames: Sequence[StereoFrame]
     weight: float = 1.0
+    fingerprint: str = ""
+    """What identifies the frames (`training.provenance`)."""
 
 
 def read_pair(frame: StereoFrame) -> StereoPair:
@@ -250,7 +253,7 @@ def open_sources(
         height, width = frames[0].size
         if height < crop[0] or width < crop[1]:
             raise TrainingError(too_small(str(location), (height, width), crop))
-        sources.append(Source(frames, weight))
+        sources.append(Source(frames, weight, data_fingerprint(opened.location, frames)))
         if not validation:
             held_out.extend(opened.validation_frames())
     for location in validation:

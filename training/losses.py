@@ -42,10 +42,17 @@ def stage_weights(step: int, stages: Sequence[ScaleWeights], ends: Sequence[int]
 
 
 def masked_mean(values: Tensor, mask: Tensor) -> Tensor:
-    """Mean of `values` where `mask`; 0 (with a gradient of 0) where the mask is empty."""
+    """Mean of `values` where `mask`; 0 (with a gradient of 0) where the mask is empty.
+
+    With several processes, a process's sum over the mean count of all of them: averaged over the processes, as
+    their gradients are, that is the mean over all their pixels, however unevenly the valid ones fall.
+    """
     count = mask.sum()
+    if torch.distributed.is_available() and torch.distributed.is_initialized():
+        torch.distributed.all_reduce(count)
+        count = count / torch.distributed.get_world_size()
     # `where` before the sum: NaN * 0 is NaN, in the backward pass too.
-    return torch.where(mask, values, 0.0).sum() / count.clamp(min=1)
+    return torch.where(mask, values, 0.0).sum() / torch.where(count > 0, count, 1)
 
 
 def downsample_disparity(truth: Tensor, size: tuple[int, int]) -> Tensor:

@@ -14,7 +14,7 @@ from torch import Tensor
 from training.errors import TrainingError
 from training.free import FreeInputs, as_free_inputs
 from training.inference import estimate
-from training.networks import ConfNet, GradNet
+from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.weights import StoredNetwork, has_weights, load_confnet, load_gradnet, load_regressor
 
 
@@ -56,6 +56,11 @@ class StereoPredictor:
             self._confnet = _matching(run, "confnet", load_confnet(run), stored.sha256).to(self._device)
         if regressor == "regressor" and has_weights(run, "gradnet"):
             self._gradnet = _matching(run, "gradnet", load_gradnet(run), stored.sha256).to(self._device)
+
+    @property
+    def networks(self) -> tuple[DispNetCorr1D, ConfNet | None, GradNet | None]:
+        """The networks, in evaluation mode."""
+        return self._regressor, self._confnet, self._gradnet
 
     def predict(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> Prediction:
         """Predict the left view's maps.

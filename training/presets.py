@@ -9,8 +9,9 @@ that work at the features' half resolution.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal, get_args
 
 from matching import SGBMParameters
 from training.augmentation import AugmentationConfig
@@ -58,6 +59,9 @@ class Preset:
     """Steps between validations, each of which writes a checkpoint."""
     validation_samples: int = 50
     """Validation frames looked at, evenly spread over the split."""
+    ema_decay: float | None = None
+    """Validate and keep an exponential moving average of the weights with this decay a step; None keeps the weights
+    themselves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,3 +310,23 @@ def find_preset(task: str, name: str) -> Preset:
                 raise TrainingError(f"{task} has no preset {name!r}; there are {', '.join(presets)}")
             return presets[name]
     raise TrainingError(f"there is no task {task!r}; there are {', '.join(TASKS)}")
+
+
+def change_preset(preset: Preset, changes: Mapping[str, Any]) -> Preset:
+    """The preset with other values of some of its fields. Raises TrainingError for one it does not have."""
+    known = [field.name for field in fields(preset)]
+    for name in changes:
+        if name not in known:
+            raise TrainingError(
+                f"{name} does not apply here: a {type(preset).__name__} has {', '.join(known)}"
+            )
+    changed = replace(preset, **changes)
+    if (
+        changed.crop_width % 64
+        or changed.crop_height % 64
+        or min(changed.crop_width, changed.crop_height) < 64
+    ):
+        raise TrainingError(
+            f"crops must be multiples of 64 each way, not {changed.crop_width}x{changed.crop_height}"
+        )
+    return changed

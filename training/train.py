@@ -6,7 +6,7 @@ import itertools
 import json
 import logging
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,13 +14,15 @@ from typing import Any
 
 import pytorch_lightning as pl
 import torch
-from pytorch_lightning.callbacks import ModelCheckpoint
 from pytorch_lightning.loggers import TensorBoardLogger
 
 from storage import write_text
 from training.callbacks import BestWeights, RunProgress
-from training.data import DEFAULT_CACHE_BYTES, StereoDataModule, open_sources
+from training.checkpoints import WholeCheckpoints, last_checkpoint
+from training.data import DEFAULT_CACHE_BYTES, Source, StereoDataModule, open_sources
 from training.errors import TrainingError
+from training.hardware import Precision, faster_layout, process_count, process_rank, trainer_options
+from training.model_card import write_model_card
 from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.presets import (
     ConfNetPreset,
@@ -30,8 +32,11 @@ from training.presets import (
     GradNetPreset,
     Preset,
     RegressorPreset,
+    change_preset,
     find_preset,
 )
+from training.provenance import code_revision
+from training.pseudo import PseudoFrames
 from training.tasks import (
     ConfNetTask,
     FineTuningTask,
@@ -51,6 +56,7 @@ from training.weights import (
 )
 
 CALIBRATION_BATCHES = 20
+CHECKPOINT = "last.ckpt"
 
 
 def train(
@@ -60,16 +66,19 @@ def train(
     preset: str | Preset = "small",
     *,
     validation: Sequence[str | Path] = (),
+    changes: Mapping[str, Any] | None = None,
+    pseudo: Path | None = None,
     init: Path | None = None,
     resume: bool = False,
     steps: int | None = None,
     seed: int = 0,
     workers: int = 0,
     device: str = "auto",
+    precision: Precision = "32",
     cache_bytes: int = DEFAULT_CACHE_BYTES,
     progress: bool = True,
 ) -> TrainingSummary:
-    """Train one network and leave it in the run folder.
+    """Train one network and leave it in the run folder, with a model card.
 
     Args:
         task: `regressor`, `regressor_f` (eq. 9, starts from a regressor), `confnet` or `gradnet` (on a frozen one),
@@ -79,12 +88,15 @@ def train(
         out: run folder; receives `<task>.safetensors`, `<task>.json` and `logs/<task>/`.
         preset: name of a preset, or one of your own.
         validation: data sets whose frames decide instead; needed where `data` has no val splits.
+        changes: other values of some of the preset's fields.
+        pseudo: folder of disparities (`training.pseudo`) to train on instead of the one data set's own truth.
         init: run folder with the regressor to start from (`regressor`: optional) or to build on (other tasks: `out`
             by default, and copied there).
         resume: continue from the last checkpoint, as if never interrupted; starts anew where there is none.
         steps: length of the run, the preset's by default; all its schedules are scaled to it.
         workers: processes that prepare crops; results do not depend on their number.
-        device: `auto`, `cpu`, `cuda`, `cuda:1`, ...
+        device: `auto`, `cpu`, `cuda`, `cuda:1`, ...; under torchrun every process takes one, and a step its crops.
+        precision: bits of the convolutions.
         cache_bytes: memory for decoded frames.
 
     Returns:
@@ -96,45 +108,90 @@ def train(
     """
     preset_name = preset if isinstance(preset, str) else "custom"
     preset = find_preset(task, preset) if isinstance(preset, str) else preset
+    if changes:
+        preset = change_preset(preset, changes)
+        preset_name += " with " + ", ".join(f"{name} {value}" for name, value in changes.items())
     steps = preset.steps if steps is None else steps
     if steps < 1:
         raise TrainingError(f"a run needs at least one step, got {steps}")
+    hardware = trainer_options(device, precision)
     out.mkdir(parents=True, exist_ok=True)
     logs = out / "logs" / task
-    checkpoint = logs / "last.ckpt"
-    settings = {
-        "preset": asdict(preset),
-        "steps": steps,
-        "seed": seed,
-        "data": [[str(f), w] for f, w in data],
-        "validation": [str(source) for source in validation],
-    }
-    resume = resume and checkpoint.is_file()
-    if resume:
-        _check_settings(logs / "settings.json", settings)
+    checkpoint = _prepare(
+        out,
+        task,
+        resume,
+        {
+            "preset": asdict(preset),
+            "steps": steps,
+            "seed": seed,
+            "data": [[str(source), weight] for source, weight in data],
+            "validation": [str(source) for source in validation],
+            "pseudo": None if pseudo is None else str(pseudo),
+            "precision": precision,
+            "processes": process_count(),
+        },
+    )
+    sources, held_out = open_sources(data, (preset.crop_height, preset.crop_width), validation)
+    if pseudo is not None:
+        sources = [_with_pseudo_truth(sources, pseudo)]
+        preset_name += f", truth from {pseudo}"
+    module = StereoDataModule(sources, held_out, preset, steps, seed, workers, cache_bytes)
+    summary = TrainingSummary(
+        preset_name,
+        steps,
+        seed,
+        tuple((str(source), weight) for source, weight in data),
+        best_step=0,
+        fingerprints=tuple(source.fingerprint for source in sources),
+        revision=code_revision(),
+    )
+    with _quiet_lightning(), torch.random.fork_rng():
+        torch.manual_seed(seed)
+        lightning_task, regressor_sha256 = _build_task(preset, module, out, init, steps, seed)
+        if hardware["accelerator"] == "cpu" or precision != "32" or not torch.cuda.is_available():
+            faster_layout(lightning_task)
+        lightning_task.mixed_precision = precision != "32"
+        if preset.ema_decay is not None:
+            lightning_task.average_weights(preset.ema_decay)
+
+        def save(step: int, figures: dict[str, float]) -> None:
+            description = replace(summary, best_step=step, validation=figures)
+            save_weights(out, task, lightning_task.kept_network, description, regressor_sha256)
+            write_model_card(out)
+
+        callbacks: list[pl.Callback] = [BestWeights(save), last_checkpoint(logs / CHECKPOINT)]
+        if progress:
+            callbacks.append(RunProgress(f"{task} ({preset_name})"))
+        trainer = _trainer(preset, steps, logs, callbacks, hardware)
+        trainer.fit(lightning_task, module, ckpt_path=checkpoint, weights_only=True)
+        trainer.strategy.barrier()  # the first process writes what the others read now
+    return read_summary(out, task)
+
+
+def _prepare(out: Path, task: str, resume: bool, settings: dict[str, Any]) -> Path | None:
+    """Check that the run folder is fit for the run, note its settings, and find the checkpoint to continue from.
+
+    A run killed before its first checkpoint starts anew.
+    """
+    logs = out / "logs" / task
+    noted = logs / "settings.json"
+    if resume and noted.is_file():
+        _check_settings(noted, settings)
     elif has_weights(out, task):
         raise TrainingError(
             f"{out}: already holds a {task}; continue it with --resume or choose another folder"
         )
-    write_text(logs / "settings.json", json.dumps(settings, indent=2) + "\n")
+    if process_rank() == 0:
+        write_text(noted, json.dumps(settings, indent=2) + "\n")
+    checkpoint = logs / CHECKPOINT
+    return checkpoint if resume and checkpoint.is_file() else None
 
-    sources, held_out = open_sources(data, (preset.crop_height, preset.crop_width), validation)
-    module = StereoDataModule(sources, held_out, preset, steps, seed, workers, cache_bytes)
-    summary = TrainingSummary(preset_name, steps, seed, tuple((str(f), w) for f, w in data), best_step=0)
-    with _quiet_lightning(), torch.random.fork_rng():
-        torch.manual_seed(seed)
-        lightning_task, regressor_sha256 = _build_task(preset, module, out, init, steps, seed)
 
-        def save(step: int, figures: dict[str, float]) -> None:
-            description = replace(summary, best_step=step, validation=figures)
-            save_weights(out, task, lightning_task.network, description, regressor_sha256)
-
-        callbacks: list[pl.Callback] = [BestWeights(save), _last_checkpoint(checkpoint)]
-        if progress:
-            callbacks.append(RunProgress(f"{task} ({preset_name})"))
-        trainer = _trainer(preset, steps, logs, callbacks, device)
-        trainer.fit(lightning_task, module, ckpt_path=checkpoint if resume else None, weights_only=True)
-    return read_summary(out, task)
+def _with_pseudo_truth(sources: Sequence[Source], folder: Path) -> Source:
+    if len(sources) != 1:
+        raise TrainingError("disparities to train on instead of the truth need exactly one data set")
+    return replace(sources[0], frames=PseudoFrames(sources[0].frames, folder))
 
 
 def _build_task(
@@ -187,9 +244,11 @@ def _new_regressor(preset: RegressorPreset, module: StereoDataModule, init: Path
 
 
 def _with_regressor(out: Path, init: Path | None) -> Path:
-    """The run folder with the regressor, copied there from `init` first if need be."""
+    """The run folder with the regressor, copied to `out` from `init` if need be."""
     if init is None or init.resolve() == out.resolve():
         return out
+    if process_rank() > 0:
+        return init
     if not has_weights(out, "regressor"):
         copy_weights(init, out, "regressor")
     elif load_regressor(init).sha256 != load_regressor(out).sha256:
@@ -207,20 +266,12 @@ def _calibrate(
     task.network.standardize(joined.mean((0, 2, 3)), joined.std((0, 2, 3)))
 
 
-def _last_checkpoint(path: Path) -> ModelCheckpoint:
-    """Everything needed to continue, replaced (atomically, by Lightning) after every validation."""
-    return ModelCheckpoint(
-        dirpath=path.parent,
-        filename=path.stem,
-        save_top_k=1,
-        enable_version_counter=False,
-        save_on_train_epoch_end=True,
-    )
-
-
-def _trainer(preset: Preset, steps: int, logs: Path, callbacks: list[pl.Callback], device: str) -> pl.Trainer:
+def _trainer(
+    preset: Preset, steps: int, logs: Path, callbacks: list[pl.Callback], hardware: dict[str, Any]
+) -> pl.Trainer:
     return pl.Trainer(
-        **_hardware(device),
+        **hardware,
+        plugins=[WholeCheckpoints()],
         max_steps=steps,
         max_epochs=-1,
         reload_dataloaders_every_n_epochs=1,
@@ -233,18 +284,6 @@ def _trainer(preset: Preset, steps: int, logs: Path, callbacks: list[pl.Callback
         enable_progress_bar=False,
         enable_model_summary=False,
     )
-
-
-def _hardware(device: str) -> dict[str, Any]:
-    """Lightning's words for `auto`, `cpu`, `cuda`, `cuda:1`, ..."""
-    kind, _, index = device.partition(":")
-    try:
-        torch.device("cpu" if kind == "auto" else device)
-    except RuntimeError as error:
-        raise TrainingError(f"there is no device {device!r}; try auto, cpu, cuda or cuda:1") from error
-    if kind == "cuda" and not torch.cuda.is_available():
-        raise TrainingError(f"cannot train on {device}: torch finds no GPU here")
-    return {"accelerator": kind, "devices": [int(index)] if index and kind != "cpu" else 1}
 
 
 def _check_settings(path: Path, settings: dict[str, Any]) -> None:

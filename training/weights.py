@@ -41,6 +41,10 @@ class TrainingSummary:
     """Steps done when these weights were taken."""
     validation: dict[str, float] = field(default_factory=dict)
     """Figures of these weights on the validation frames; empty where there were none."""
+    fingerprints: tuple[str, ...] = ()
+    """What identifies each data set's frames."""
+    revision: str = ""
+    """Version and git revision of the code."""
 
 
 @dataclass(frozen=True)

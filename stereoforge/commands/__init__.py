@@ -5,6 +5,7 @@ from typing import Protocol
 
 from stereoforge.commands.demo import Demo
 from stereoforge.commands.evaluate import Evaluate
+from stereoforge.commands.export_model import ExportModel
 from stereoforge.commands.refine import Refine
 from stereoforge.commands.render import Render
 from stereoforge.commands.study import Study
@@ -26,6 +27,7 @@ COMMANDS: dict[str, Callable[..., Command]] = {
     "verify": Verify,
     "view": View,
     "train": Train,
+    "export-model": ExportModel,
     "tune": Tune,
     "refine": Refine,
     "evaluate": Evaluate,

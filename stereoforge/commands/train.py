@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
 from stereoforge.errors import UsageError
 from stereoforge.progress import console
-from stereoforge.values import parse_weighted_source, shown
+from stereoforge.values import parse_size, parse_weighted_source, shown
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,14 @@ class Train:
     """tiny: minutes on a laptop; small: hours; full: the paper's own training."""
     validation: Annotated[tuple[str, ...], shown("DATA", "the val splits of --data")] = ()
     """Data sets that decide which weights are kept."""
+    crop: Annotated[str | None, shown("WxH", "the preset's")] = None
+    """Size of the training crops, multiples of 64; KITTI's frames need 320 rows or fewer."""
+    correct_within: Annotated[float | None, shown("PX", "the preset's, 1")] = None
+    """confnet: a disparity this close to the truth counts as correct (KITTI: 3)."""
+    ema: Annotated[float | None, shown("DECAY", "none")] = None
+    """Validate and keep a moving average of the weights, for example 0.999."""
+    pseudo: Annotated[Path | None, shown("DIR", "none")] = None
+    """Folder of disparities to train on instead of the data set's own truth: <frame name>.pfm or KITTI-like .png."""
     init: Annotated[Path | None, shown("RUN", "none")] = None
     """Run folder of the regressor to start from or to build on."""
     resume: bool = False
@@ -50,7 +58,9 @@ class Train:
     workers: Annotated[int, shown("N")] = 0
     """Processes that prepare crops; results do not depend on their number."""
     device: Annotated[str, shown("NAME")] = "auto"
-    """auto, cpu, cuda, cuda:1, ..."""
+    """auto, cpu, cuda, cuda:1, ...; torchrun starts one process a device."""
+    precision: Literal["32", "bf16", "16"] = "32"
+    """Bits of the convolutions; 16 and bf16 are mixed precision."""
 
     def run(self) -> None:
         for name, value, least in (
@@ -64,6 +74,7 @@ class Train:
         if self.task == "rdf":
             self._train_forest([source for source, _ in data])
             return
+        from training.hardware import process_rank
         from training.train import train
 
         summary = train(
@@ -72,13 +83,18 @@ class Train:
             self.out,
             self.preset,
             validation=self.validation,
+            changes=self._changes(),
+            pseudo=self.pseudo,
             init=self.init,
             resume=self.resume,
             steps=self.steps,
             seed=self.seed,
             workers=self.workers,
             device=self.device,
+            precision=self.precision,
         )
+        if process_rank() > 0:
+            return
         figures = ", ".join(f"{name} {value:.4g}" for name, value in summary.validation.items())
         console.print(
             f"{self.out / self.task}.safetensors: step {summary.best_step} of {summary.steps}"
@@ -104,3 +120,18 @@ class Train:
             f"{forest_file(self.out)}: {len(forest.roots)} trees of {len(forest.feature)} nodes in all",
             markup=False,
         )
+
+    def _changes(self) -> dict[str, Any]:
+        """What the flags change about the preset."""
+        changes: dict[str, Any] = {}
+        if self.crop is not None:
+            changes["crop_width"], changes["crop_height"] = parse_size(self.crop, "crop")
+        if self.correct_within is not None:
+            if not 0 < self.correct_within < float("inf"):
+                raise UsageError(f"--correct-within must be positive, got {self.correct_within}")
+            changes["correct_within_px"] = self.correct_within
+        if self.ema is not None:
+            if not 0 < self.ema < 1:
+                raise UsageError(f"--ema must lie between 0 and 1, got {self.ema}")
+            changes["ema_decay"] = self.ema
+        return changes

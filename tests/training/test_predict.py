@@ -15,7 +15,10 @@ from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, DispNetOutp
 from training.predict import StereoPredictor
 from training.weights import TrainingSummary, load_gradnet, load_regressor, read_summary, save_weights
 
-SUMMARY = TrainingSummary("custom", 10, 0, (("data", 1.0),), best_step=5, validation={"epe": 1.5})
+SUMMARY = TrainingSummary(
+    "custom", 10, 0, (("data", 1.0),), best_step=5, validation={"epe": 1.5},
+    fingerprints=("4 frames, recipe abc",), revision="0.1.0 (cafe)",
+)  # fmt: skip
 CONFIG = DispNetConfig(width=0.0625, normalization="batch")
 
 

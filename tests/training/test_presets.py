@@ -1,14 +1,23 @@
 """The full presets are the published training; schedules follow their definition."""
 
 import math
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 
 import pytest
 import torch
 
+from training.inference import regress
 from training.losses import STAGE_WEIGHTS
 from training.metrics import bad_rate, gradient_error, optimal_auc, sparsification_auc
-from training.networks import DispNetConfig, DispNetCorr1D, HeadConfig
+from training.networks import (
+    ConfNet,
+    DispNetConfig,
+    DispNetCorr1D,
+    GradNet,
+    HeadConfig,
+    left_right_consistency,
+    predict_right,
+)
 from training.presets import (
     PRESETS,
     ConfNetPreset,
@@ -18,7 +27,7 @@ from training.presets import (
     RegressorPreset,
     find_preset,
 )
-from training.tasks import RegressorTask
+from training.tasks import ConfNetTask, GradNetTask, RegressorTask
 from training.tasks.base import learning_rate_factor
 
 
@@ -63,6 +72,79 @@ def test_full_heads() -> None:
     assert gradnet.network == HeadConfig(97, 64, 128, 0.2, "none", False)
     assert (confnet.correct_within_px, gradnet.gradient_threshold_px) == (1.0, 1.0)
     assert fine_tuning.gradient_weight == 5.0
+
+
+def full_regressor() -> RegressorPreset:
+    preset = find_preset("regressor", "full")
+    assert isinstance(preset, RegressorPreset)
+    return preset
+
+
+def narrow_task() -> RegressorTask:
+    """The full preset's task, as training builds it but for the network's width."""
+    preset = full_regressor()
+    return RegressorTask(preset, DispNetCorr1D(replace(preset.network, width=0.0625)), preset.steps, seed=0)
+
+
+def test_the_full_optimizer_runs_the_published_schedule() -> None:
+    """Read off the running optimizer and scheduler: Adam's constants, and the rate around every halving."""
+    configured = narrow_task().configure_optimizers()
+    optimizer, scheduler = configured["optimizer"], configured["lr_scheduler"]["scheduler"]
+    assert isinstance(optimizer, torch.optim.Adam)
+    assert configured["lr_scheduler"]["interval"] == "step"
+    for group in optimizer.param_groups:
+        assert (group["betas"], group["eps"], group["lr"]) == ((0.9, 0.999), 1e-4, 1e-4)
+    rate = scheduler.lr_lambdas[0]
+    halvings = (200_000, 350_000, 500_000, 650_000, 800_000)
+    for number, step in enumerate(halvings):
+        assert rate(step - 1) == 0.5**number
+        assert rate(step) == 0.5 ** (number + 1)
+    assert rate(1_199_999) == 0.5**5
+
+
+@pytest.mark.parametrize("step", [0, 99_999, 100_000, 250_000, 399_999, 450_000, 550_000, 600_000, 1_199_999])
+def test_the_full_loss_weighs_the_scales_of_the_step(step: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The loss of a batch is the table's row of that step times the error of each scale."""
+    task = narrow_task()
+    monkeypatch.setattr(type(task), "global_step", property(lambda _: step))
+    torch.manual_seed(0)
+    batch = {"left": torch.rand(1, 3, 64, 64), "right": torch.rand(1, 3, 64, 64)}
+    batch["disparity"] = torch.full((1, 1, 64, 64), 7.0)
+    with torch.no_grad():
+        errors = [
+            (torch.relu(d) - 7.0).abs().mean().item()
+            for d in task.network(batch["left"], batch["right"]).disparities
+        ]
+        loss = task.loss(batch).item()
+    row = STAGE_WEIGHTS[min(step // 100_000, 6)]
+    assert loss == pytest.approx(sum(w * e for w, e in zip(row, errors, strict=True)), rel=1e-5)
+
+
+def test_full_heads_see_the_features_and_the_mirrored_consistency() -> None:
+    """ConfNet's input is the image (3), 97 features and the LRC map made of a mirrored prediction; GradNet's the
+    image and the features."""
+    torch.manual_seed(0)
+    regressor = DispNetCorr1D()
+    presets = {name: find_preset(name, "full") for name in ("confnet", "gradnet")}
+    assert isinstance(presets["confnet"], ConfNetPreset)
+    assert isinstance(presets["gradnet"], GradNetPreset)
+    confnet = ConfNetTask(presets["confnet"], regressor, ConfNet(presets["confnet"].network), 1, 0)
+    gradnet = GradNetTask(presets["gradnet"], regressor, GradNet(presets["gradnet"].network), 1, 0)
+    left, right = torch.rand(2, 1, 3, 64, 128)
+    batch = {"left": left, "right": right}
+    (image, features, consistency), disparity = confnet.head_inputs(batch)
+    assert (image.shape[1], features.shape[1], consistency.shape[1]) == (3, 97, 1)
+    with torch.no_grad():
+        mirrored = predict_right(lambda a, b: regress(regressor, a, b).disparity, left, right)
+    torch.testing.assert_close(consistency, left_right_consistency(disparity, mirrored))
+    assert confnet.network.joined_input(image, features, consistency).shape == (1, 101, 64, 128)
+    inputs, _ = gradnet.head_inputs(batch)
+    assert gradnet.network.joined_input(*inputs).shape == (1, 100, 64, 128)
+    for task, epsilon in ((confnet, 1e-8), (gradnet, 1e-8)):
+        groups = task.configure_optimizers()["optimizer"].param_groups
+        assert {id(p) for p in groups[0]["params"]} == {id(p) for p in task.network.parameters()}
+        assert groups[0]["weight_decay"] == task.preset.optimizer.weight_decay > 0
+        assert groups[0]["eps"] == epsilon
 
 
 @pytest.mark.parametrize(("task", "name"), [(task, name) for task in PRESETS for name in PRESETS[task]])

@@ -1,11 +1,13 @@
 """Whole runs on data sets on disk: they learn, resume exactly, and say what is wrong."""
 
+import hashlib
 import json
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import pytorch_lightning as pl
 import safetensors.torch
@@ -13,13 +15,16 @@ import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from datagen import DatasetError, StereoDataset
-from tests.training.synthetic import write_dataset
+from tests.datagen.sources import published
+from tests.training.synthetic import random_pair, write_dataset
 from training.augmentation import NO_AUGMENTATION
 from training.errors import TrainingError
 from training.networks import DispNetConfig
 from training.predict import StereoPredictor
 from training.presets import Preset, RegressorPreset, find_preset
+from training.tasks import GradNetTask, StereoTask
 from training.train import train
+from training.weights import read_summary
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -100,7 +105,7 @@ def test_resumed_equals_uninterrupted(task: str, data: Path, run: Path, tmp_path
     train(task, [(data, 1.0)], whole, preset, steps=11, seed=3, progress=False)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pl.LightningModule, "on_train_batch_end", _stop_after(6), raising=True)
+        patch.setattr(StereoTask, "on_train_batch_end", _stop_after(6))
         with pytest.raises(_PowerCut):
             train(task, [(data, 1.0)], broken, preset, steps=11, seed=3, progress=False)
     train(task, [(data, 1.0)], broken, preset, steps=11, seed=3, resume=True, progress=False)
@@ -183,6 +188,109 @@ def test_tensorboard_holds_figures_and_pictures(run: Path) -> None:
     assert width == 4 * 128 + 3 * 4
 
 
+def test_the_card_names_data_steps_figures_and_code(data: Path, run: Path) -> None:
+    card = (run / "model_card.md").read_text()
+    summary = read_summary(run, "regressor")
+    recipe = hashlib.sha256((data / "recipe.yaml").read_bytes()).hexdigest()
+    assert f"| data, weight 1 | {data}: 4 frames, recipe {recipe} |" in card
+    assert f"| steps | {summary.best_step} of 6 " in card
+    assert f"{summary.validation['epe']:.4g}" in card
+    assert summary.revision in card
+
+
+def test_a_moving_average_is_what_is_kept(data: Path, tmp_path: Path) -> None:
+    """With a decay of 0.5 the kept weights are the average of those of every step, half the weight each time."""
+    steps: list[torch.Tensor] = []
+    with pytest.MonkeyPatch.context() as patch:
+        update = StereoTask.on_train_batch_end
+
+        def on_train_batch_end(self: StereoTask, *arguments: object) -> None:
+            steps.append(self.network.state_dict()["pr6.weight"].clone())
+            update(self, *arguments)  # type: ignore[arg-type]
+
+        patch.setattr(StereoTask, "on_train_batch_end", on_train_batch_end)
+        train(
+            "regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=4, changes={"ema_decay": 0.5},
+            progress=False,
+        )  # fmt: skip
+    average = steps[0]
+    for weight in steps[1:]:
+        average = 0.5 * average + 0.5 * weight
+    torch.testing.assert_close(weights(tmp_path, "regressor")["pr6.weight"], average)
+    assert not torch.equal(average, steps[-1])
+    assert read_summary(tmp_path, "regressor").preset == "custom with ema_decay 0.5"
+
+
+def test_mixed_precision_is_nearly_the_same_run(data: Path, tmp_path: Path) -> None:
+    """bf16 holds three digits: the first loss is that of 32 bits to one percent, and not exactly."""
+    presets = {name: quick_regressor(validation_interval=10) for name in ("32", "bf16")}
+    for name, preset in presets.items():
+        train("regressor", [(data, 1.0)], tmp_path / name, preset, steps=10, precision=name, progress=False)  # type: ignore[arg-type]
+    losses = [scalars(tmp_path / name, "regressor", "train/loss")[9] for name in presets]
+    assert losses[0] == pytest.approx(losses[1], rel=0.03)
+    assert losses[0] != losses[1]
+    stored = weights(tmp_path / "bf16", "regressor")
+    assert all(tensor.dtype in (torch.float32, torch.int64) for tensor in stored.values())
+
+
+def test_killed_before_the_first_checkpoint(data: Path, tmp_path: Path) -> None:
+    """Weights without a checkpoint: --resume starts the same run anew instead of refusing it."""
+    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, progress=False)
+    before = weights(tmp_path, "regressor")
+    (tmp_path / "logs" / "regressor" / "last.ckpt").unlink()
+    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, resume=True, progress=False)
+    assert all(torch.equal(before[name], tensor) for name, tensor in weights(tmp_path, "regressor").items())
+
+
+def write_kitti(root: Path, count: int) -> None:
+    """Sparse truth in KITTI's layout."""
+    for index in range(count):
+        pair = random_pair(np.random.default_rng(index), 80, 140)
+        name = f"{index:06d}_10.png"
+        published.png(root / f"training/image_2/{name}", pair.left)
+        published.png(root / f"training/image_3/{name}", pair.right)
+        code = np.rint(pair.disparity_left * 256).astype(np.uint16)
+        code[::3] = code[:, ::3] = 0
+        published.png(root / f"training/disp_occ_0/{name}", code)
+
+
+def test_recipes_for_sparse_real_data(run: Path, tmp_path: Path) -> None:
+    """The paper's: ConfNet on the first pairs with t = 3, GradNet on dense disparities of another method."""
+    write_kitti(tmp_path / "kitti", 4)
+    data, held_out = [(f"kitti2015:{tmp_path / 'kitti'}#0-1", 1.0)], [f"{tmp_path / 'kitti'}#2-3"]
+    train(
+        "confnet", data, tmp_path / "run", quick("confnet"), init=run, validation=held_out, steps=4,
+        changes={"correct_within_px": 3.0}, progress=False,
+    )  # fmt: skip
+    assert set(read_summary(tmp_path / "run", "confnet").validation) == {"auc", "auc_random", "auc_optimal"}
+
+    for index in range(2):
+        dense = random_pair(np.random.default_rng(index), 80, 140).disparity_left
+        published.pfm(tmp_path / f"pseudo/{index:06d}_10.pfm", dense)
+    seen: list[float] = []
+    with pytest.MonkeyPatch.context() as patch:
+        loss = GradNetTask.loss
+        patch.setattr(
+            GradNetTask,
+            "loss",
+            lambda self, batch: (
+                seen.append(torch.isnan(batch["disparity"]).float().mean().item()) or loss(self, batch)
+            ),
+        )
+        train(
+            "gradnet", data, tmp_path / "run", quick("gradnet"), pseudo=tmp_path / "pseudo", steps=4,
+            progress=False,
+        )  # fmt: skip
+    assert max(seen) == 0
+    assert "truth from" in read_summary(tmp_path / "run", "gradnet").preset
+
+    (tmp_path / "pseudo" / "000001_10.pfm").unlink()
+    with pytest.raises(TrainingError, match="has no disparity for the frame 000001_10"):
+        train(
+            "gradnet", data, tmp_path / "run", quick("gradnet"), pseudo=tmp_path / "pseudo", steps=4, resume=True
+        )  # fmt: skip
+
+
 def test_validation_is_optional(tmp_path: Path) -> None:
     data = write_dataset(tmp_path / "set", 0, train=2)
     summary = train("regressor", [(data, 1.0)], tmp_path / "run", quick_regressor(), steps=5, progress=False)
@@ -203,6 +311,14 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
         train("depthnet", source, tmp_path)
     with pytest.raises(TrainingError, match="regressor has no preset 'huge'; there are tiny, small, full"):
         train("regressor", source, tmp_path, "huge")
+    with pytest.raises(TrainingError, match="crops must be multiples of 64 each way, not 100x64"):
+        train("regressor", source, tmp_path, quick("regressor"), changes={"crop_width": 100})
+    with pytest.raises(
+        TrainingError, match="correct_within_px does not apply here: a RegressorPreset has steps"
+    ):
+        train("regressor", source, tmp_path, "tiny", changes={"correct_within_px": 3.0})
+    with pytest.raises(TrainingError, match="16-bit floats need a GPU; bf16 works on CPUs too"):
+        train("regressor", source, tmp_path, "tiny", precision="16", device="cpu")
     with pytest.raises(TrainingError, match="at least one step"):
         train("regressor", source, tmp_path, "tiny", steps=0)
     with pytest.raises(TrainingError, match="no trained regressor"):

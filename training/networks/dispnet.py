@@ -84,9 +84,10 @@ class ExpandingStage(nn.Module):
         self.pr = nn.Conv2d(channels, 1, 3, 1, 1)
 
     def forward(self, below: Tensor, prediction: Tensor, skip: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        joined = torch.cat([skip, self.upconv(below), self.uppr(prediction)], dim=1)
+        upsampled = in_full_precision(self.uppr, prediction)
+        joined = torch.cat([skip, self.upconv(below), upsampled], dim=1)
         features = self.iconv(joined)
-        return features, self.pr(features), joined
+        return features, in_full_precision(self.pr, features), joined
 
 
 class DispNetCorr1D(nn.Module):
@@ -160,7 +161,7 @@ class DispNetCorr1D(nn.Module):
         conv4 = self.conv4_1(self.conv4(conv3))
         conv5 = self.conv5_1(self.conv5(conv4))
         features = self.conv6_1(self.conv6(conv5))
-        prediction = self.pr6(features)
+        prediction = in_full_precision(self.pr6, features)
 
         predictions = [prediction]
         joined = features
@@ -173,6 +174,14 @@ class DispNetCorr1D(nn.Module):
             disparities=tuple(scale * p for p in predictions),
             features=torch.cat([joined[:, :-1], scale * joined[:, -1:]], dim=1),
         )
+
+
+def in_full_precision(layer: nn.Module, maps: Tensor) -> Tensor:
+    """A layer that makes pixels of disparity, in 32 bits under mixed precision too: 16 bits hold a disparity of 100
+    to half a pixel."""
+    with torch.autocast(maps.device.type, enabled=False):
+        result: Tensor = layer(maps.float())
+    return result
 
 
 def initialize(network: nn.Module) -> None:

@@ -91,7 +91,7 @@ class PixelHead(nn.Module):
         output: Tensor = self.layers(
             (joined - self.input_mean[:, None, None]) / self.input_std[:, None, None]
         )
-        return _resized(output, *inputs[0].shape[-2:])
+        return _resized(output.float(), *inputs[0].shape[-2:])
 
 
 def _activation(name: Activation) -> nn.Module:

@@ -11,6 +11,7 @@ import numpy as np
 import pytorch_lightning as pl
 import torch
 from torch import Tensor, nn
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from training.data import Batch
 from training.errors import TrainingError
@@ -46,6 +47,23 @@ class StereoTask(pl.LightningModule):
         self.preset = preset
         self.steps = steps
         self.seed = seed
+        self.mixed_precision = False
+        self._averaged: AveragedModel | None = None
+
+    def average_weights(self, decay: float) -> None:
+        """Keep a moving average of the network's weights; from now on it is what is validated and saved."""
+        average = get_ema_multi_avg_fn(decay)  # type: ignore[no-untyped-call]
+        self._averaged = AveragedModel(self.network, multi_avg_fn=average)
+        self._averaged.requires_grad_(False)
+
+    @property
+    def kept_network(self) -> Any:
+        """The network that is validated and saved: the one trained, or its moving average."""
+        return self.network if self._averaged is None else self._averaged.module
+
+    def on_train_batch_end(self, outputs: Any, batch: Batch, batch_idx: int) -> None:  # noqa: ARG002
+        if self._averaged is not None:
+            self._averaged.update_parameters(self.network)
 
     @abstractmethod
     def loss(self, batch: Batch) -> Tensor:
@@ -76,7 +94,7 @@ class StereoTask(pl.LightningModule):
                 f"the loss of step {self.global_step} is {loss.item()}, so training stopped; the last checkpoint "
                 f"is whole, and a smaller learning rate or gradient clipping usually helps"
             )
-        self.log("train/loss", loss.detach(), batch_size=len(batch["left"]))
+        self.log("train/loss", loss.detach(), batch_size=len(batch["left"]), sync_dist=True)
         self.log("train/learning_rate", self.optimizers().param_groups[0]["lr"])
         return loss
 
@@ -100,7 +118,8 @@ class StereoTask(pl.LightningModule):
             lr=config.learning_rate,
             betas=config.betas,
             eps=config.epsilon,
-            fused=True,
+            # Gradients are clipped between unscaling and the step, which a fused optimizer does in one.
+            fused=not self.mixed_precision,
         )
         scheduler = torch.optim.lr_scheduler.LambdaLR(
             optimizer, lambda step: learning_rate_factor(config, step, self.steps, self.preset.steps)

@@ -47,7 +47,7 @@ class FreeConfNetTask(StereoTask):
     @torch.no_grad()
     def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
         inputs, disparity = self.head_inputs(batch)
-        confidence = self.network.confidence(*inputs)
+        confidence = self.kept_network.confidence(*inputs)
         truth, threshold = batch["disparity"], self.correct_within_px
         rate = bad_rate(disparity, truth, threshold)
         figures = {
@@ -91,7 +91,7 @@ class FreeGradNetTask(StereoTask):
     @torch.no_grad()
     def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
         inputs, disparity = self.head_inputs(batch)
-        gradient, matched = self.network(*inputs), forward_differences(disparity)
+        gradient, matched = self.kept_network(*inputs), forward_differences(disparity)
         figures = {
             "gradient": gradient_error(gradient, batch["gradient"], self.threshold_px),
             "gradient_matched": gradient_error(matched, batch["gradient"], self.threshold_px),

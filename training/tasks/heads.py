@@ -64,7 +64,9 @@ class ConfNetTask(_HeadTask):
         )
 
     def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-        disparity, confidence, _ = estimate(self.regressor, self.network, None, batch["left"], batch["right"])
+        disparity, confidence, _ = estimate(
+            self.regressor, self.kept_network, None, batch["left"], batch["right"]
+        )
         assert confidence is not None
         truth, threshold = batch["disparity"], self.correct_within_px
         rate = bad_rate(disparity, truth, threshold)
@@ -109,7 +111,9 @@ class GradNetTask(_HeadTask):
         return masked_gradient_l1(self.network(*inputs), batch["gradient"], self.threshold_px)
 
     def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-        disparity, _, gradient = estimate(self.regressor, None, self.network, batch["left"], batch["right"])
+        disparity, _, gradient = estimate(
+            self.regressor, None, self.kept_network, batch["left"], batch["right"]
+        )
         assert gradient is not None
         regressed = forward_differences(disparity)
         figures = {

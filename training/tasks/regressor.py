@@ -28,7 +28,7 @@ class _DisparityTask(StereoTask):
         return self.network.contracting_weights()
 
     def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-        disparity = estimate(self.network, None, None, batch["left"], batch["right"]).disparity
+        disparity = estimate(self.kept_network, None, None, batch["left"], batch["right"]).disparity
         truth = batch["disparity"]
         figures = {
             "epe": end_point_error(disparity, truth),
