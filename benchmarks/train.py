@@ -86,18 +86,22 @@ def build_task(preset: Preset, regressor_preset: RegressorPreset) -> StereoTask:
     raise TypeError(f"no task trains a {type(preset).__name__}")
 
 
-def our_step(task: StereoTask, batch: Batch) -> Step:
+def our_step(task: StereoTask, batch: Batch, bf16: bool = False) -> Step:
     """One iteration as `training.train` runs it on a CPU."""
     faster_layout(task)
     task.train()
+    task.mixed_precision = bf16
     optimizer = task.configure_optimizers()["optimizer"]
 
     def step() -> None:
-        if isinstance(task, RegressorTask):  # the schedule's step comes from the trainer, which is not here
-            predictions = task.network(batch["left"], batch["right"]).disparities
-            loss = multiscale_l1(predictions, batch["disparity"], [0.2] * 5 + [1.0])
-        else:
-            loss = task.loss(batch)
+        with torch.autocast("cpu", torch.bfloat16, enabled=bf16):
+            if isinstance(
+                task, RegressorTask
+            ):  # the schedule's step comes from the trainer, which is not here
+                predictions = task.network(batch["left"], batch["right"]).disparities
+                loss = multiscale_l1(predictions, batch["disparity"], [0.2] * 5 + [1.0])
+            else:
+                loss = task.loss(batch)
         optimizer.zero_grad()
         loss.backward()
         if task.preset.optimizer.clip_norm is not None:
@@ -171,13 +175,23 @@ def convolution_operations(network: nn.Module, run: Callable[[], object]) -> flo
     return 3 * total
 
 
-def convolution_share(step: Step) -> float:
-    """Share of an iteration's time inside convolutions."""
-    with profile(activities=[ProfilerActivity.CPU]) as profiler:
-        step()
-    events = profiler.key_averages()
-    inside = sum(event.self_cpu_time_total for event in events if "conv" in event.key)
-    return inside / sum(event.self_cpu_time_total for event in events)
+def convolution_share(step: Step, rounds: int = 5) -> float:
+    """Share of an iteration's time inside convolutions.
+
+    The median of each operation's time over the rounds, since the profiler measures wall time, in which other
+    programs' turns on this core show.
+    """
+    runs = []
+    for _ in range(rounds):
+        with profile(activities=[ProfilerActivity.CPU]) as profiler:
+            step()
+        runs.append([(event.name, event.self_cpu_time_total) for event in profiler.events()])
+    everything = inside = 0.0
+    for events in zip(*runs, strict=True):
+        seconds = statistics.median(time for _, time in events)
+        everything += seconds
+        inside += seconds if "conv" in events[0][0] else 0.0
+    return inside / everything
 
 
 def fadnet_dispnet(folder: Path) -> nn.Module:
@@ -199,7 +213,12 @@ def compare(name: str, crops: int, rounds: int, fadnet: Path | None) -> None:
     ours = our_step(task, batch)
     plain = PlainDispNet(preset.network)
     left, right = batch["left"], batch["right"]
-    steps = {"ours": ours, "plain PyTorch": rival_step(plain, lambda: plain(left, right), batch, clip)}
+    half = RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0)
+    steps = {
+        "ours": ours,
+        "ours in bf16": our_step(half, batch, bf16=True),
+        "plain PyTorch": rival_step(plain, lambda: plain(left, right), batch, clip),
+    }
     if fadnet is not None:
         other = fadnet_dispnet(fadnet)
         both = torch.cat([left, right], dim=1)
