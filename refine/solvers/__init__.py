@@ -1,9 +1,25 @@
-"""Solvers of the MRF's linear system: one a module, each a function (system, start, tolerance) ->
-LinearSolution."""
+"""Solvers of the MRF's linear system: one a module, each a function (problem, tolerance) -> LinearSolution.
 
-from refine.solvers.cg import solve_cg
-from refine.solvers.direct import solve_direct
-from refine.solvers.linear import LinearSolution, SolverError
-from refine.solvers.multigrid import solve_multigrid
+Imported where they are used: the iterative ones bring numba along.
+"""
 
-__all__ = ["LinearSolution", "SolverError", "solve_cg", "solve_direct", "solve_multigrid"]
+from __future__ import annotations
+
+from refine.solvers.linear import LinearSolution, Problem, SolverError
+
+__all__ = ["LinearSolution", "Problem", "SolverError", "solve"]
+
+
+def solve(problem: Problem, solver: str, tolerance: float) -> LinearSolution:
+    """Run the solver of that name: "multigrid", "cg" or "direct"."""
+    if solver == "multigrid":
+        from refine.solvers.multigrid import solve_multigrid
+
+        return solve_multigrid(problem, tolerance)
+    if solver == "cg":
+        from refine.solvers.cg import solve_cg
+
+        return solve_cg(problem, tolerance)
+    from refine.solvers.direct import solve_direct
+
+    return solve_direct(problem, tolerance)

@@ -6,17 +6,17 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from refine.solvers.linear import LinearSolution, SolverError
-from refine.system import MRFSystem
-from refine.weights import Floats
+from refine.solvers.linear import LinearSolution, Problem, SolverError
 
 
-def solve_direct(system: MRFSystem, start: Floats, tolerance: float) -> LinearSolution:  # noqa: ARG001
-    """Solve by SuperLU; `start` and `tolerance` do not matter to it.
+def solve_direct(problem: Problem, tolerance: float) -> LinearSolution:  # noqa: ARG001
+    """Solve by SuperLU; neither `problem.start` nor `tolerance` matters to it.
 
     Raises:
         SolverError: If the matrix is singular, that is if nothing determines the disparity of some region.
     """
+    system = problem.system()
+    height, width = problem.shape
     # Both forms are diagonally led and symmetric in structure: the ordering for A' + A and pivots from the
     # diagonal fill in far less than the defaults for general matrices.
     try:
@@ -27,15 +27,13 @@ def solve_direct(system: MRFSystem, start: Floats, tolerance: float) -> LinearSo
             options={"SymmetricMode": True},
         )
     except RuntimeError as error:
-        raise SolverError(
-            f"the MRF of {system.shape[1]}x{system.shape[0]} pixels is singular: {error}"
-        ) from error
+        raise SolverError(f"the MRF of {width}x{height} pixels is singular: {error}") from error
     x = factors.solve(system.right_hand_side)
     # One step of iterative refinement wins back the digits that large jumps between coefficients cost.
     x += factors.solve(system.right_hand_side - system.apply(x))
     if not np.isfinite(x).all():
         raise SolverError(
-            f"the MRF of {system.shape[1]}x{system.shape[0]} pixels has no finite solution; "
+            f"the MRF of {width}x{height} pixels has no finite solution; "
             "some region has neither a disparity nor a tie to its surroundings"
         )
-    return LinearSolution(x=x, iterations=0, converged=True)
+    return LinearSolution(x.reshape(height, width), 0, system.relative_residual(x), converged=True)

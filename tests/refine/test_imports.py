@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-HEAVY = ("torch", "bpy", "pytorch_lightning")
+HEAVY = ("torch", "bpy", "pytorch_lightning", "numba", "pyamg")
 
 
 @pytest.mark.parametrize("module", ["refine", "refine.metrics", "refine.report"])
