@@ -1,6 +1,6 @@
-"""The README's strips: a few scenes of a data set side by side, each picture over its ground truth.
+"""The strips in the README and docs/families: scenes of a data set side by side, pictures over ground truth.
 
-python docs/pictures/strip.py DATA OUT.jpg [--split test] [--scenes 0 3 5 8] [--width 400]
+python docs/pictures/strip.py DATA OUT.jpg [--split test] [--scenes 0 3 5 8] [--width 400] [--rows 4]
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from viewing import (
 )
 
 
-def column(sample: StereoSample, width: int) -> Picture:
-    """Left picture, disparity, occlusion and gradients, top to bottom."""
+def column(sample: StereoSample, width: int, rows: int) -> Picture:
+    """The first `rows` of left picture, disparity, occlusion and gradients, top to bottom."""
     pictures = [
         sample.left,
         disparity_picture(sample.disparity_left),
         occlusion_picture(sample.occlusion_left, sample.left),
         gradient_picture(sample.gradient_left, 0.25),
-    ]
+    ][:rows]
     height = round(width * sample.left.shape[0] / sample.left.shape[1])
     return stacked([cv2.resize(item, (width, height), interpolation=cv2.INTER_AREA) for item in pictures])
 
@@ -40,12 +40,15 @@ def main() -> None:
     parser.add_argument("--split", default="test")
     parser.add_argument("--scenes", type=int, nargs="+", default=[0, 1, 2, 3])
     parser.add_argument("--width", type=int, default=400)
+    parser.add_argument("--rows", type=int, default=4)
     arguments = parser.parse_args()
     first_frames = {
         int(sample.name.split("/")[2]): sample
         for sample in reversed(StereoDataset(arguments.data, arguments.split))
     }
-    picture = side_by_side([column(first_frames[scene], arguments.width) for scene in arguments.scenes])
+    picture = side_by_side(
+        [column(first_frames[scene], arguments.width, arguments.rows) for scene in arguments.scenes]
+    )
     cv2.imwrite(str(arguments.out), picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 

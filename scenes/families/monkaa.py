@@ -152,7 +152,7 @@ def _creatures(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> i
             rng,
             Coat(
                 tufts=integer(rng, *config.fur_locks) if furry else 0,
-                tuft_length=log_uniform(rng, 0.022, 0.065),
+                tuft_length=log_uniform(rng, 0.028, 0.075),
                 cells=54 if index == 0 else 40,
             ),
         )

@@ -350,7 +350,7 @@ def _ruined(rng: np.random.Generator, plan: _Plan, count: int, stone: Stuff, rui
     """Walls, towers, arches, steps, columns and a statue, here and there; `ruin` scales their decay."""
     stage, d = plan.stage, plan.depth_m
     worn = [stage.wear(rng, stone, 2.0, 1.8 * d, size=512) for _ in range(2)]
-    hewn = stage.wear(rng, plan.place.stones, 1.5, 1.8 * d)
+    hewn = stage.wear(rng, plan.place.stones, 2.0, 1.3 * d, size=512)
     for index in range(count):
         kind = choose(rng, (BlockWall, Archway, Steps, Column, "statue"), (0.3, 0.25, 0.12, 0.2, 0.13))
         spot = stage.scatter(rng, (1.1 * d, 7.0 * d), 1.1)
@@ -431,8 +431,8 @@ def _lights(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> tupl
 
 
 _PLACES: dict[str, _Place] = {
-    "mountain": _Place(0.2, ground(HEATH), rock(), (0.04, 0.18), (0.5, 1.0), (0.08, 0.2), 1.0, _mountain),
-    "snow": _Place(0.17, grains(SNOW), SNOWY, (0.04, 0.18), (0.4, 1.0), (0.08, 0.2), 0.8, _snow),
+    "mountain": _Place(0.2, ground(HEATH), rock(), (0.06, 0.26), (0.5, 1.0), (0.12, 0.32), 1.0, _mountain),
+    "snow": _Place(0.17, grains(SNOW), SNOWY, (0.06, 0.26), (0.4, 1.0), (0.12, 0.32), 0.8, _snow),
     "desert": _Place(0.15, grains(SAND), DESERT_ROCK, (0.01, 0.07), (0.0, 0.5), (0.05, 0.2), 1.0, _desert),
     "bamboo": _Place(0.14, ground(DRY_GRASS), rock(), (0.03, 0.15), (0.2, 0.7), (0.1, 0.2), 0.5, _bamboo),
     "ruins": _Place(0.18, ground(HEATH), rock(), (0.02, 0.14), (0.2, 0.9), (0.1, 0.3), 0.6, _ruins),
