@@ -171,8 +171,9 @@ def boulders(
     stones: Sequence[Stuff],
     depths: Range = (0.7, 8.0),
     scales: Range = (0.04, 0.35),
+    sunk: Range = (0.2, 0.6),
 ) -> None:
-    """Stones sunk into the ground."""
+    """Stones sunk into the ground, by `sunk` relative to their scale."""
     stage, unit_m = garden.stage, garden.unit_m
     kinds = [replace(Boulder.sample(rng), detail=3) for _ in range(4)]
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
@@ -180,5 +181,5 @@ def boulders(
     outfits = _outfits(rng, kinds, worn)
     for index, spot in enumerate(garden.spots(rng, count, depths, 1.15)):
         (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
-        sunk_m = scale_m * uniform(rng, 0.2, 0.6)
+        sunk_m = scale_m * uniform(rng, *sunk)
         stage.stand(f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk_m)

@@ -133,7 +133,7 @@ def sample_sintel(rng: np.random.Generator, config: SintelConfig) -> Scene:
     rocks = round(plan.place.rockiness * integer(rng, *config.boulders))
     boulders(rng, plan.garden, "rock", rocks, stones, (0.8, 9.0), (0.025, 0.16))
     crags = round(plan.place.rockiness * integer(rng, 4, 9))
-    boulders(rng, plan.garden, "crag", crags, stones, (9.0, 30.0), (0.3, 1.3))
+    boulders(rng, plan.garden, "crag", crags, stones, (9.0, 30.0), (0.3, 1.3), (0.4, 0.8))
     base = Scene(
         family="sintel",
         frames=config.frames,
