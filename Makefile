@@ -16,7 +16,11 @@ BIN := .venv/bin
 # What Blender's library wants from the system, where it is not there already (Debian's names).
 BLENDER_LIBRARIES := libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libxext6 libsm6 libice6 libgl1
 
-.PHONY: install demo study test check clean
+# Blender's other line of long-term support comes as a library for Python 3.13 only; no torch beside it.
+PYTHON313 ?= python3.13
+BLENDER_5_2 := .venv-blender-5.2
+
+.PHONY: install demo study test check test-blender-5.2 clean
 
 install: .venv/.installed
 
@@ -35,6 +39,16 @@ check: .venv/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+test-blender-5.2: $(BLENDER_5_2)/.installed
+	OMP_NUM_THREADS=1 $(BLENDER_5_2)/bin/python -m pytest $(PYTEST_FLAGS) tests/scenes tests/datagen tests/storage tests/viewing
+
+$(BLENDER_5_2)/.installed: pyproject.toml
+	@$(PYTHON313) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 13))' 2>/dev/null || \
+	  { echo "Blender 5.2's library needs Python 3.13, which is not here; say where with make test-blender-5.2 PYTHON313=/path/to/python3.13"; exit 1; }
+	$(PYTHON313) -m venv $(BLENDER_5_2)
+	$(BLENDER_5_2)/bin/python -m pip install --quiet --progress-bar off $(PIP_FLAGS) 'bpy>=5.2,<5.3' --editable '.[render,dev]'
+	@touch $@
 
 .venv/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
@@ -57,4 +71,4 @@ blender-libraries:
 	@$(BIN)/python -c 'import bpy' || { echo "Blender needs system libraries: apt-get install $(BLENDER_LIBRARIES)"; exit 1; }
 
 clean:
-	rm -rf .venv build *.egg-info
+	rm -rf .venv $(BLENDER_5_2) build *.egg-info

@@ -7,7 +7,7 @@ come from the same untouched world whether a final pass is rendered or not.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 
 import bpy
@@ -35,21 +35,19 @@ def render_final(
 
     exposure: The factor the pictures will be exposed with, which the fog's colour is given after.
     """
-    return {eye: _render_eye(world, eye, frame, exposure, scratch) for eye in EYES}
-
-
-def _render_eye(
-    world: BuiltWorld, eye: Eye, frame: int, exposure: float, scratch: Path
-) -> NDArray[np.float32]:
     final = world.scene.final
-    place(world, eye, float(frame))
     with ExitStack() as stack:
-        if final.shutter_frames > 0:
-            stack.enter_context(_open_shutter(world, eye, frame, final.shutter_frames))
         if final.f_number > 0:
             stack.enter_context(_lens(world, final))
         if final.fog is not None:
             stack.enter_context(_foggy(world, final.fog, exposure))
+        return {eye: _render_eye(world, eye, frame, scratch) for eye in EYES}
+
+
+def _render_eye(world: BuiltWorld, eye: Eye, frame: int, scratch: Path) -> NDArray[np.float32]:
+    place(world, eye, float(frame))
+    shutter_frames = world.scene.final.shutter_frames
+    with _open_shutter(world, eye, frame, shutter_frames) if shutter_frames > 0 else nullcontext():
         seed = _FINAL_SEED + 2 * frame + (eye == "right")
         return render_radiance(world, f"final_{eye}_{frame}", seed, scratch)
 
