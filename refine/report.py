@@ -61,6 +61,9 @@ class ReportContext:
     limits: tuple[str, ...] = ()
     """Honest sentences a reader must know before believing a number: budget, sizes, what is missing."""
     bootstrap_seed: int = 0
+    compact: bool = False
+    """For results that are kept under version control: without each frame's numbers (results.csv and .json) and
+    without the panels as files of their own (Figs 6 and 8), which the page shows all the same."""
     sections: str = ""
     """Further parts of the page as HTML, put between the summary and the sets; the first has the id "gap"."""
 
@@ -72,6 +75,7 @@ class ReportFiles:
     html: Path
     csv: Path
     json: Path
+    """These two are not there in a compact report."""
     figures: Path
     """Folder of the figures, a folder a set: `fig1-N.png`, `fig4.svg`, `fig4-mean.svg`, `fig5.svg`, `fig6-N.png`;
     in KITTI's style 7 and 8 for 5 and 6."""
@@ -120,14 +124,15 @@ def write_report(
     about = {"title": context.title, **context.facts, "limits": list(context.limits)}
     views = [_set_view(each, index, context.bootstrap_seed) for index, each in enumerate(sets)]
     tables = {view.name: view.tables for view in views}
-    write_text(files.csv, results_csv(sets))
-    write_text(files.json, results_json(sets, about))
+    if not context.compact:
+        write_text(files.csv, results_csv(sets))
+        write_text(files.json, results_json(sets, about))
     write_text(out / "tables.csv", tables_csv(tables))
     write_text(out / "tables.json", tables_json(tables))
     write_text(out / "tables.md", tables_markdown(tables))
     write_text(out / "tables.tex", tables_latex(tables))
     for view in views:
-        for name, content in _figure_files(view):
+        for name, content in _figure_files(view, context.compact):
             write_bytes(files.figures / folder_name(view.name) / name, content)
     write_text(files.html, _page(sets, views, context))
     return files
@@ -191,7 +196,7 @@ def _curve_figures(evaluation: Evaluation) -> Iterator[tuple[str, Any]]:
     yield "fig4-mean.svg", curve_figure(mean, None, f"Mean of {len(evaluation.frames)} frames")
 
 
-def _figure_files(view: SetView) -> Iterator[tuple[str, bytes]]:
+def _figure_files(view: SetView, compact: bool) -> Iterator[tuple[str, bytes]]:
     """Each figure of a set: its file's name and content."""
     for name, figure in _curve_figures(view.evaluation):
         yield name, svg_file(figure).encode()
@@ -199,6 +204,7 @@ def _figure_files(view: SetView) -> Iterator[tuple[str, bytes]]:
         yield "fig7.svg" if view.kitti else "fig5.svg", svg_file(auc_figure(view.evaluation.frames)).encode()
     panels = "fig8" if view.kitti else "fig6"
     for number, panel in enumerate((*view.panels, *view.worst), start=1):
-        yield f"{panels}-{number}.png", encoded(panel_picture(panel))
+        if not compact:
+            yield f"{panels}-{number}.png", encoded(panel_picture(panel))
         if panel.lens is not None:
             yield f"fig1-{number}.png", encoded(lens_picture(panel.lens))

@@ -96,6 +96,7 @@ def report_evaluation(
     facts: Mapping[str, str] | None = None,
     bootstrap_seed: int = 0,
     sections: str = "",
+    compact: bool = False,
 ) -> ReportFiles:
     """Write the report, saying what was evaluated with what; the arguments are those of `ReportContext`."""
     context = ReportContext(
@@ -104,6 +105,7 @@ def report_evaluation(
         limits=limits,
         bootstrap_seed=bootstrap_seed,
         sections=sections,
+        compact=compact,
     )
     return write_report(sets, out, context)
 

@@ -77,6 +77,7 @@ def write_results(
         limits=(),
         bootstrap_seed=plan.seed,
         sections=sections,
+        compact=True,
     )
     write_text(out / "figures" / "disparities.svg", svg_file(distribution))
     write_text(out / "summary.json", _json(summary(subject, plan.test, cells)))

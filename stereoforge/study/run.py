@@ -33,7 +33,7 @@ from storage import write_bytes
 from training.presets import Preset, find_preset
 from training.train import train
 
-PANELS = EvaluationOptions(first_panels=2, worst_panels=2)
+PANELS = EvaluationOptions(first_panels=2, worst_panels=1)
 """Fewer pictures than `evaluate` shows: there are many sets."""
 REFERENCE_METHODS = ("regressor", "gradnet", "ours", "ours_conf_gt")
 """What is run with the networks of domains other than the subject."""

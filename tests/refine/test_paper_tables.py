@@ -17,7 +17,7 @@ from refine.methods import default_methods
 from refine.metrics import kitti_d1
 from refine.paper import PAPER, counterpart
 from refine.paper_tables import paper_tables
-from refine.report import write_report
+from refine.report import ReportContext, write_report
 from refine.results import EvaluatedSet, results_csv, results_json
 from refine.table_files import tables_csv, tables_json, tables_latex, tables_markdown
 from tests.refine.worlds import toy_frame
@@ -176,6 +176,9 @@ def test_a_report_of_two_sets_has_a_block_and_figures_for_each(
     }
     assert {path.name for path in (files.figures / "cars").iterdir()} >= {"fig7.svg", "fig8-1.png"}
     assert (files.figures / "cars" / "fig7.svg").read_text().startswith("<?xml")
+    small = write_report([kitti], tmp_path / "compact", ReportContext(compact=True))
+    assert not small.csv.exists()
+    assert {path.name for path in (small.figures / "cars").glob("fig[68]*")} == set()
     with pytest.raises(ValueError, match="no two of one name"):
         write_report([evaluated, evaluated], tmp_path)
 

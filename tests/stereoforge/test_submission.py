@@ -12,9 +12,14 @@ import pytest
 from datagen.formats import read_png, write_png
 from datagen.frame import StereoFrame
 from refine.baselines.regressor import Regressor
+from refine.bootstrap import bootstrap
 from refine.evaluation import EvaluationFrame
+from refine.paper_tables import paper_tables
 from stereoforge.errors import UsageError
+from stereoforge.evaluation import evaluate_set, evaluation_options, open_test_data
+from stereoforge.prediction import Image, Predictors
 from stereoforge.submission import encode_disparity, find_submission_frames, write_submission
+from training.predict import Prediction
 
 SIZE = (20, 60)
 
@@ -59,6 +64,40 @@ def test_the_folder_is_what_the_server_takes(tmp_path: Path, testing: bool) -> N
     values = read_png(tmp_path / "out" / "disp_0" / "000001_10.png")
     assert values.dtype == np.uint16
     np.testing.assert_array_equal(values, np.maximum(red * 256, 1))
+
+
+def test_kitti_sets_are_told_apart_and_judged_by_their_own_customs(tmp_path: Path) -> None:
+    root = kitti_set(tmp_path / "kitti", testing=False)
+    objects = np.zeros(SIZE, np.uint8)
+    objects[:, 30:] = 7
+    for number in range(2):
+        path = root / "training" / "obj_map" / f"{number:06d}_10.png"
+        path.parent.mkdir(exist_ok=True)
+        write_png(path, objects)
+    (data,) = open_test_data([str(root)], "test")
+    assert (data.name, data.family) == ("kitti", "kitti2015")
+
+    @dataclass
+    class Wrong:
+        """Right, but 2 px off on the background and 5 px off on the cars."""
+
+        def predict(self, left: Image, right: Image) -> Prediction:  # noqa: ARG002
+            return Prediction(10 + np.where(objects > 0, 5, 2).astype(np.float32), None, None)
+
+    evaluated = evaluate_set(data, Predictors(Wrong(), None), (Regressor(),))
+    score = evaluated.evaluation.scores["regressor"]
+    assert (score.d1.background, score.d1.foreground, score.d1.all) == (0, 1, 0.5)
+    assert score.regions["all"].bad == 0.5
+    assert [table.number for table in paper_tables(evaluated)][-1] == 6
+    assert bootstrap(evaluated.evaluation).scenes == 2
+    assert evaluation_options("driving").bad_threshold == 1
+    assert evaluation_options("kitti2015", 2.0).bad_threshold == 2
+
+
+def test_sets_are_named_so_that_no_two_are_alike(tmp_path: Path) -> None:
+    folders = [kitti_set(tmp_path / parent / "kitti", testing=False) for parent in ("a", "b")]
+    names = [data.name for data in open_test_data([str(folder) for folder in folders], "test")]
+    assert names == [str(folder) for folder in folders]
 
 
 def test_zero_means_no_estimate_only() -> None:

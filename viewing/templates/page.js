@@ -1,16 +1,17 @@
 "use strict";
-// Tables: a press on a heading sorts by that column, a second press the other way round.
+// Tables: a press on a heading sorts by that column, a second press the other way round; what is no number among
+// numbers (a dash) comes last either way.
 function cellValue(row, column) {
   const cell = row.cells[column];
   const text = cell.dataset.value ?? cell.textContent.trim();
   const number = parseFloat(text);
   return Number.isNaN(number) ? text : number;
 }
-function compareCells(a, b) {
-  if (typeof a === "number" && typeof b === "number") return a - b;
+function compareCells(a, b, sign) {
+  if (typeof a === "number" && typeof b === "number") return sign * (a - b);
   if (typeof a === "number") return -1;
   if (typeof b === "number") return 1;
-  return a.localeCompare(b);
+  return sign * a.localeCompare(b);
 }
 function sortTable(table, heading) {
   const headings = [...heading.parentNode.cells];
@@ -19,8 +20,8 @@ function sortTable(table, heading) {
   for (const other of headings) other.removeAttribute("aria-sort");
   heading.setAttribute("aria-sort", ascending ? "ascending" : "descending");
   const body = table.tBodies[0];
-  const rows = [...body.rows].sort((a, b) => compareCells(cellValue(a, column), cellValue(b, column)));
-  body.append(...(ascending ? rows : rows.reverse()));
+  const sign = ascending ? 1 : -1;
+  body.append(...[...body.rows].sort((a, b) => compareCells(cellValue(a, column), cellValue(b, column), sign)));
 }
 for (const table of document.querySelectorAll("table.sortable")) {
   for (const heading of table.tHead.rows[table.tHead.rows.length - 1].cells) {
