@@ -14,6 +14,7 @@ from refine.evaluation import EvaluationOptions, evaluate
 from refine.methods import Method
 from refine.report import ReportContext, ReportFiles, write_report
 from refine.results import EvaluatedSet
+from refine.settings import Settings
 from stereoforge.prediction import Predictors
 from stereoforge.progress import progress_bar
 from training.presets import TASKS
@@ -108,6 +109,15 @@ def report_evaluation(
         compact=compact,
     )
     return write_report(sets, out, context)
+
+
+def describe_settings(settings: Settings) -> str:
+    """Where the methods' parameters come from."""
+    if not settings.methods:
+        return "the methods' defaults"
+    frames = len(settings.about.get("frames", ()))
+    data = ", ".join(map(str, settings.about.get("data", ())))
+    return f"chosen on {frames} validation frames of {data}"
 
 
 def _describe_networks(weights: Path) -> Iterator[str]:

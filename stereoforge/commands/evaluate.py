@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -54,7 +56,13 @@ class Evaluate:
             raise UsageError(f"--bad-threshold must be positive, got {self.bad_threshold}")
         if self.seed < 0:
             raise UsageError(f"--seed must not be negative, got {self.seed}")
-        from stereoforge.evaluation import evaluate_set, evaluation_options, open_test_data, report_evaluation
+        from stereoforge.evaluation import (
+            describe_settings,
+            evaluate_set,
+            evaluation_options,
+            open_test_data,
+            report_evaluation,
+        )
         from stereoforge.prediction import fallback_notes, open_predictors, open_settings
         from stereoforge.submission import find_submission_frames, write_submission
 
@@ -67,7 +75,11 @@ class Evaluate:
             evaluate_set(each, predictors, rows, evaluation_options(each.family, self.bad_threshold))
             for each in data
         ]
-        files = report_evaluation(sets, self.weights, self.out, bootstrap_seed=self.seed)
+        facts = {
+            "Parameters": describe_settings(settings),
+            "Command": shlex.join(["stereoforge", *sys.argv[1:]]),
+        }
+        files = report_evaluation(sets, self.weights, self.out, facts=facts, bootstrap_seed=self.seed)
         for note in fallback_notes(self.weights) if self.predictor == "sgbm" else []:
             console.print(note, markup=False)
         for name, reason in sets[0].evaluation.skipped.items():

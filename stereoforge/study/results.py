@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from refine.report_tables import Cell, Table, number
 from refine.results import EvaluatedSet
-from stereoforge.evaluation import report_evaluation
+from stereoforge.evaluation import describe_settings, report_evaluation
+from stereoforge.prediction import open_settings
 from stereoforge.study.gap import MEASURES, Gap, error_of, gaps, gaps_document, summary
 from stereoforge.study.plan import StudyPlan
 from stereoforge.study.statistics import BIN_PX, QUANTILES, DomainStatistics
@@ -72,9 +73,9 @@ def write_results(
         out,
         title=f"Trained on {subject}, tested on {', '.join(plan.test)}",
         facts={
-            "Plan": "plan.yaml beside this page; stereoforge study --plan plan.yaml --out DIR makes it again"
+            "Parameters": describe_settings(open_settings(None, weights)),
+            "Command": "stereoforge study --plan plan.yaml --out DIR, with the plan.yaml beside this page",
         },
-        limits=(),
         bootstrap_seed=plan.seed,
         sections=sections,
         compact=True,
