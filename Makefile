@@ -32,7 +32,7 @@ study: .venv/.installed
 	rm -rf results && cp -R $(STUDY)/results results
 
 test: .venv/.installed-dev
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(PYTEST_FLAGS)
+	OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest $(PYTEST_FLAGS)
 
 check: .venv/.installed-dev
 	$(BIN)/ruff check .
