@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +17,12 @@ class Sensor:
     """The two eyes' sensors of a scene; noise follows from the Scene record, the frame and the eye."""
 
     def __init__(self, scene: Scene) -> None:
-        self._final = scene.final
-        digest = hashlib.sha256(scene_to_json(scene).encode()).digest()
-        self._seed = int.from_bytes(digest[:8], "big")
+        self._scene, self._final = scene, scene.final
+
+    @cached_property
+    def _seed(self) -> int:
+        digest = hashlib.sha256(scene_to_json(self._scene).encode()).digest()
+        return int.from_bytes(digest[:8], "big")
 
     def expose(
         self, radiance: NDArray[np.float32], exposure: float, eye: Eye, frame: int
