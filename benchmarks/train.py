@@ -223,16 +223,23 @@ def compare(name: str, crops: int, rounds: int, fadnet: Path | None) -> None:
         other = fadnet_dispnet(fadnet)
         both = torch.cat([left, right], dim=1)
         steps["FADNet's DispNetC"] = rival_step(other, lambda: list(other(both)), batch, clip)
+    operations = convolution_operations(task.network, lambda: task.network(left, right))
+    work = dict.fromkeys(steps, operations)
+    if fadnet is not None:
+        work["FADNet's DispNetC"] = convolution_operations(other, lambda: other(both))
     seconds = alternate(steps, rounds)
     print(f"\n{name}: {crops} crops of {preset.crop_width}x{preset.crop_height}, one thread")
     for rival, value in seconds.items():
-        print(f"  {rival:20} {value:8.3f} CPU s an iteration  {value / seconds['ours']:5.2f} x ours")
-    operations = convolution_operations(task.network, lambda: task.network(left, right))
+        print(
+            f"  {rival:20} {value:8.3f} CPU s an iteration  {value / seconds['ours']:5.2f} x ours  "
+            f"{work[rival] / 1e9:6.1f} GFLOP in convolutions, {work[rival] / value / 1e9:5.1f} a second"
+        )
     share, peak = convolution_share(ours), gemm_peak()
     reached = operations / (share * seconds["ours"])
-    print(f"  convolutions: {operations / 1e9:.1f} GFLOP an iteration, {share:.0%} of the time, at")
     print(
-        f"  {reached / 1e9:.1f} GFLOP/s, {reached / peak:.0%} of the {peak / 1e9:.1f} of a matrix product here"
+        f"  ours: {share:.0%} of the time in convolutions, at {reached / 1e9:.1f} GFLOP/s, {reached / peak:.0%} of the "
+        f"{peak / 1e9:.1f} of a matrix product here;\n  with nothing else to do it would be "
+        f"{seconds['plain PyTorch'] / (share * seconds['ours']):.2f} times as fast as plain PyTorch"
     )
 
 

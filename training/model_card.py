@@ -52,7 +52,7 @@ def write_model_card(run: Path, folder: Path | None = None) -> Path:
         "",
         "Trained on rendered worlds unless the data above says otherwise; expect a loss of accuracy on photographs, "
         "on disparities beyond those of the training set, and where matching has nothing to hold on to (sky, glass, "
-        "repetition). The figures are of validation frames from the same source as the training set.",
+        "repetition). The figures are of validation frames, most often of the same source as the training set.",
     ]
     path = (folder or run) / FILE_NAME
     write_text(path, "\n".join(lines) + "\n")
