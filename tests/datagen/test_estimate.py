@@ -17,7 +17,9 @@ from scenes.shapes.basic import Box, Superquadric
 from scenes.shapes.revolved import Cylinder
 from stereoforge.values import shown_duration
 
-RECIPES = sorted((Path(__file__).parents[2] / "recipes").glob("*.yaml"))
+FOLDER = Path(__file__).parents[2] / "recipes"
+RECIPES = [path for path in sorted(FOLDER.glob("*.yaml")) if not path.stem.startswith("study")]
+"""Of data sets; studies have recipes of another kind."""
 WORLD = FAMILIES["flying_things"].config(
     width=96,
     height=54,
