@@ -130,7 +130,7 @@ def test_a_data_set_carries_the_files_it_uses(user: Path, tmp_path: Path) -> Non
     recipe.write_text(
         "world: {family: flying_things, width: 96, height: 54, flying_objects: [6, 6], "
         "background_objects: [2, 2], background_materials: [2, 2], user_share: 1.0}\n"
-        "scenes: {train: 1}\nsamples: 1\n"
+        "scenes: {train: 1}\nsamples: 1\nseed: 1\n"
     )
     folders = {name: user / name for name in ("meshes", "textures", "environments")}
     Render(out=out, recipe=recipe, workers=1, **folders).run()
