@@ -58,7 +58,8 @@ class StudyPlan:
     """Paths a pixel."""
     preset: str = "small"
     fine_tuning_steps: int = 0
-    """Steps of the subject's regressor on each other test domain's training split; 0 leaves that out."""
+    """Steps of the subject's regressor on the training split of each other test domain that has one; 0 leaves that
+    out."""
     tuning_frames: int = 0
     """Validation frames of each training domain on which the methods' parameters are chosen; 0 takes the
     defaults."""
@@ -100,11 +101,6 @@ class StudyPlan:
     @property
     def subject(self) -> str:
         return self.train[0]
-
-    @property
-    def fine_tuned(self) -> tuple[str, ...]:
-        """The domains that the subject is fine-tuned on."""
-        return tuple(name for name in self.test if name != self.subject) if self.fine_tuning_steps else ()
 
     def recipe(self, name: str, splits: tuple[str, ...]) -> Recipe:
         """What to render of a domain for training or for testing. Raises DatasetError for a wrong config."""

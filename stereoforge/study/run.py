@@ -19,6 +19,7 @@ from refine.archive import read_evaluation, write_evaluation
 from refine.evaluation import EvaluationOptions
 from refine.methods import table_order
 from scenes.serialization import to_plain
+from stereoforge.errors import UsageError
 from stereoforge.evaluation import TestData, evaluate_set, evaluation_options, family_of
 from stereoforge.forest import PLANS, train_forest
 from stereoforge.prediction import forest_file, open_predictors, open_settings, parameters_file
@@ -55,6 +56,7 @@ def run_study(
         device: What the networks are trained and run on.
 
     Raises:
+        UsageError: A data set without splits is to be trained and tested on.
         CommandError, DatasetError, TrainingError: What its steps raise.
     """
     study = _Study(plan, out, presets, device)
@@ -88,6 +90,23 @@ class _Study:
     def __init__(self, plan: StudyPlan, out: Path, presets: Mapping[str, Preset] | None, device: str) -> None:
         self.plan, self.out, self.device = plan, out, device
         self.presets = presets or {}
+        for name in plan.train:
+            if name in plan.test and not self._has_splits(name):
+                raise UsageError(
+                    f"{plan.domains[name].source}: has no splits of its own, so it would be tested on what it was "
+                    "trained on; give two parts of it, such as SOURCE#0-99 to train and SOURCE#100-199 to test on"
+                )
+
+    def _has_splits(self, name: str) -> bool:
+        source = self.plan.domains[name].source
+        return source is None or len(open_source(source).format.splits) > 0
+
+    @cached_property
+    def adapted_domains(self) -> tuple[str, ...]:
+        """Those that the subject is fine-tuned on."""
+        if not self.plan.fine_tuning_steps:
+            return ()
+        return tuple(name for name in self.plan.test if name != self.plan.subject and self._has_splits(name))
 
     @property
     def jobs(self) -> list[Job]:
@@ -106,7 +125,7 @@ class _Study:
 
     @cached_property
     def training_data(self) -> dict[str, _Data]:
-        names = dict.fromkeys((*self.plan.train, *self.plan.fine_tuned))
+        names = dict.fromkeys((*self.plan.train, *self.adapted_domains))
         return {name: self._data(name, "train", TRAINING_SPLITS) for name in names}
 
     @cached_property
@@ -283,7 +302,7 @@ class _Study:
             name: self._training_job(
                 f"{subject}-to-{name}", "regressor", name, self.plan.fine_tuning_steps, init
             )
-            for name in self.plan.fine_tuned
+            for name in self.adapted_domains
         }
 
     @cached_property

@@ -15,12 +15,14 @@ from refine.evaluation import evaluate
 from refine.methods import default_methods
 from refine.results import EvaluatedSet
 from scenes import FAMILIES
+from stereoforge.cli import main
 from stereoforge.errors import UsageError
 from stereoforge.study import DomainPlan, StudyPlan, StudyResult, read_plan, run_study
 from stereoforge.study.gap import Gap, gaps, summary
 from stereoforge.study.jobs import duration, make_job, run_jobs
 from stereoforge.study.plan import NETWORKS
 from tests.refine.worlds import toy_frame
+from tests.stereoforge.test_submission import kitti_set
 from training.presets import Preset, find_preset
 
 SIZE = (128, 64)
@@ -60,9 +62,19 @@ def tiny_plan(**changes: Any) -> StudyPlan:
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, StudyResult]:
+def plan(tmp_path_factory: pytest.TempPathFactory) -> StudyPlan:
+    """Rendered worlds, and somebody's data set without splits."""
+    cars = kitti_set(tmp_path_factory.mktemp("cars") / "kitti", testing=False)
+    plan = tiny_plan()
+    return replace(
+        plan, domains={**plan.domains, "cars": DomainPlan(source=str(cars))}, test=(*plan.test, "cars")
+    )
+
+
+@pytest.fixture(scope="module")
+def study(plan: StudyPlan, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, StudyResult]:
     out = tmp_path_factory.mktemp("study")
-    return out, run_study(tiny_plan(), out, presets=tiny_presets())
+    return out, run_study(plan, out, presets=tiny_presets())
 
 
 def evaluated(seed: int) -> EvaluatedSet:
@@ -174,15 +186,46 @@ def test_jobs_are_done_once_and_a_changed_setting_is_another_job(
     assert len(list(tmp_path.iterdir())) == 4
 
 
+def test_the_same_frames_are_never_trained_and_tested_on(tmp_path: Path) -> None:
+    cars = kitti_set(tmp_path / "kitti", testing=False)
+    domains = {"cars": DomainPlan(source=str(cars))}
+    with pytest.raises(UsageError, match="tested on what it was trained on"):
+        run_study(tiny_plan(domains=domains, train=("cars",), test=("cars",)), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("flags", "complaint"),
+    [
+        (("--train", "flying_things"), "one to test on"),
+        (("--train", "flying_things", "--test", "driving", "--steps", "regresor=5"), "--steps takes NAME=N"),
+        (("--train", "flying_things", "--test", "driving", "--scenes", "train=0"), "at least 1"),
+        (("--plan", "plan.yaml", "--seed", "3"), "--plan says it all"),
+        (("--plan", "plan.yaml"), "there is no plan"),
+    ],
+)
+def test_wrong_flags_are_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: tuple[str, ...], complaint: str
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["study", "--out", str(tmp_path / "out"), *flags])
+    assert end.value.code == 2
+    assert complaint in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_durations_read_as_one_says_them() -> None:
     assert [duration(seconds) for seconds in (3, 700, 11100)] == ["3 s", "12 min", "3 h 05 min"]
 
 
 @pytest.mark.slow
-def test_a_study_of_rendered_worlds_leaves_what_it_promises(study: tuple[Path, StudyResult]) -> None:
+def test_a_study_leaves_what_it_promises(plan: StudyPlan, study: tuple[Path, StudyResult]) -> None:
     out, result = study
-    names = tiny_plan().test
-    assert set(result.cells) == {(a, b) for a in names for b in names}
+    names = plan.test
+    assert set(result.cells) == {(a, b) for a in plan.train for b in names}
+    # Nothing is trained on what has no training split of its own.
+    assert not [path for path in (out / "networks").iterdir() if "cars" in path.name]
+    assert {gap.domain for gap in result.gaps} == set(names[1:])
     numbers = json.loads((out / "results" / "summary.json").read_text())
     assert set(numbers) == set(names)
     for test in names:
@@ -197,27 +240,27 @@ def test_a_study_of_rendered_worlds_leaves_what_it_promises(study: tuple[Path, S
     assert "https://" not in page
     for name in ("tables.md", "tables.tex", "tables.csv", "plan.yaml", "gap.json", "figures/disparities.svg"):
         assert (out / "results" / name).stat().st_size > 0
-    assert read_plan(out / "results" / "plan.yaml") == tiny_plan()
+    assert read_plan(out / "results" / "plan.yaml") == plan
 
 
 @pytest.mark.slow
 def test_a_finished_study_does_nothing_again_and_a_change_redoes_what_it_touches(
-    study: tuple[Path, StudyResult], capsys: pytest.CaptureFixture[str]
+    plan: StudyPlan, study: tuple[Path, StudyResult], capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, _ = study
     kinds = ("data", "networks", "evaluations", "statistics", "runs")
     before = {path: path.stat().st_mtime_ns for kind in kinds for path in (out / kind).rglob("*")}
     results = (out / "results" / "summary.json").read_bytes()
-    run_study(tiny_plan(), out, presets=tiny_presets())
+    run_study(plan, out, presets=tiny_presets())
     assert {path: path.stat().st_mtime_ns for kind in kinds for path in (out / kind).rglob("*")} == before
     assert (out / "results" / "summary.json").read_bytes() == results
     capsys.readouterr()
 
     changed = {**STEPS, "confnet": 2}
-    name = tiny_plan().subject
+    name = plan.subject
     domains = {key: replace(each, steps=changed) for key, each in tiny_plan().domains.items()}
-    plan = tiny_plan(domains=domains, train=(name,), test=(name,), fine_tuning_steps=0)
-    run_study(plan, out, presets=tiny_presets())
+    other = tiny_plan(domains=domains, train=(name,), test=(name,), fine_tuning_steps=0)
+    run_study(other, out, presets=tiny_presets())
     added = {path.relative_to(out).parts[:2] for kind in kinds for path in (out / kind).rglob("*")} - {
         path.relative_to(out).parts[:2] for path in before
     }
