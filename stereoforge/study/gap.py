@@ -9,7 +9,7 @@ from typing import Any
 from refine.results import EvaluatedSet, null_nan
 
 NAN = float("nan")
-MEASURES = {"epe_all": "EPE, px", "bad_all": "> 1 px", "gradient_masked": "gradient error, smooth"}
+MEASURES = {"epe_all": "EPE, px", "bad_all": "> 1 px, %", "gradient_masked": "gradient error, smooth"}
 """What the gap is measured in."""
 SUMMARY = {"bad1": "bad_all", "epe": "epe_all", "gradient": "gradient_masked"}
 """Names in summary.json; bad1 is a share 0..1 of pixels off by more than 1 px."""

@@ -120,8 +120,7 @@ def _gap_table(found: list[Gap]) -> Table | None:
             number(gap.size, 2, scale),
             *(number(share, 0, 100) for share in gap.shares.values()),
         )
-        unit = MEASURES[gap.measure] + (", %" if scale == 100 else "")
-        rows.append((f"{gap.domain}: {unit}", cells))
+        rows.append((f"{gap.domain}: {MEASURES[gap.measure]}", cells))
     headings = (
         "Tested on",
         "trained elsewhere",
@@ -146,7 +145,7 @@ def _statistics_table(statistics: Mapping[str, DomainStatistics]) -> Table:
         )
         for name, each in statistics.items()
     )
-    quantiles = (f"{share:.0%} of pixels below, px".replace("%", " %") for share in QUANTILES)
+    quantiles = (f"{share:.0%}".replace("%", " %") for share in QUANTILES)
     words = ("at a jump, %", "occluded, %", "out of frame, %", "textured, %")
     return Table(("Domain", "frames", *quantiles, "mean slope", *words), rows)
 
