@@ -110,26 +110,16 @@ def solve_mrf(
 ) -> MRFSolution:
     """`refine_disparity` with the result in float64 and an account of how it was reached."""
     began = time.perf_counter()
-    known, trust, slopes, colors = _checked(disparity, confidence, gradient, image)
     if form not in ("exact", "paper"):
         raise ValueError(f"the MRF's form is 'exact' or 'paper', not {form!r}")
     if solver not in ("auto", *_SOLVERS):
         raise ValueError(f"the MRF's solver is one of 'auto', 'multigrid', 'cg', 'direct', not {solver!r}")
     if not 0 < tolerance < 1:
         raise ValueError(f"the solver's tolerance must be between 0 and 1, got {tolerance}")
-    initial = _filled(known)
-    problem = Problem(
-        disparity=initial,
-        confidence=np.where(np.isnan(known), 0, trust),
-        gradient=slopes,
-        image=colors,
-        parameters=parameters,
-        form=form,
-        start=initial if x0 is None else _checked_start(x0, initial.shape),
-    )
+    problem = checked_problem(disparity, confidence, gradient, image, parameters, form, x0)
     name = solver
     if solver == "auto":
-        name = "direct" if initial.size <= _DIRECT_UP_TO_PIXELS else "multigrid"
+        name = "direct" if problem.disparity.size <= _DIRECT_UP_TO_PIXELS else "multigrid"
     solution, used = _solve(problem, name, tolerance)
     info = SolveInfo(
         solver=used,
@@ -139,6 +129,29 @@ def solve_mrf(
         fell_back=used != name,
     )
     return MRFSolution(solution.x, info)
+
+
+def checked_problem(
+    disparity: ArrayLike,
+    confidence: ArrayLike,
+    gradient: ArrayLike,
+    image: ArrayLike,
+    parameters: MRFParameters,
+    form: Form,
+    x0: ArrayLike | None = None,
+) -> Problem:
+    """The inputs of `refine_disparity` as arrays, missing disparities filled; ValueError if one is wrong."""
+    known, trust, slopes, colors = _checked(disparity, confidence, gradient, image)
+    initial = _filled(known)
+    return Problem(
+        disparity=initial,
+        confidence=np.where(np.isnan(known), 0, trust),
+        gradient=slopes,
+        image=colors,
+        parameters=parameters,
+        form=form,
+        start=initial if x0 is None else _checked_start(x0, initial.shape),
+    )
 
 
 def _solve(problem: Problem, name: str, tolerance: float) -> tuple[LinearSolution, str]:

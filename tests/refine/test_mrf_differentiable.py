@@ -1,0 +1,102 @@
+"""The torch refinement: the same answer as the reference, and gradients against finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from refine import MRFParameters, SolverError, solve_mrf
+from refine.differentiable import ImageWeights, image_weights, refine_batch
+from refine.weights import edge_weights, neighbor_weights
+from tests.refine.worlds import Problem, random_problem
+
+FORMS = ["exact", "paper"]
+TIGHT = 1e-12
+
+
+def batch(problems: list[Problem]) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
+    disparity, confidence, gradient, image = (
+        torch.from_numpy(np.stack([inputs[i] for inputs in (problem.inputs for problem in problems)]))
+        for i in range(4)
+    )
+    return disparity, confidence, gradient.permute(0, 3, 1, 2), image.permute(0, 3, 1, 2)
+
+
+@pytest.mark.parametrize("style", ["noise", "smooth", "constant", "mixed"])
+@pytest.mark.parametrize("size", [(9, 11), (1, 5), (4, 1)])
+def test_image_weights_are_those_of_the_reference(style, size):
+    problem = random_problem(*size, seed=1, style=style)
+    weights = image_weights(batch([problem])[3], 2.55, torch.float64)
+    phi_x, phi_y = edge_weights(problem.image, 2.55)
+    np.testing.assert_allclose(weights.phi_x[0], phi_x, rtol=1e-10)
+    np.testing.assert_allclose(weights.phi_y[0], phi_y, rtol=1e-10)
+    np.testing.assert_allclose(weights.neighbors[0], neighbor_weights(problem.image), atol=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_batch_is_solved_like_its_samples(form):
+    problems = [random_problem(12, 9, seed, style) for seed, style in enumerate(["mixed", "smooth", "noise"])]
+    problems[1].gradient[3, 4, 0] = np.nan
+    disparity, confidence, gradient, image = batch(problems)
+    weights = image_weights(image, 2.55, torch.float64)
+    found = refine_batch(disparity, confidence, gradient, weights, form=form, tolerance=TIGHT)
+    for problem, refined in zip(problems, found, strict=True):
+        expected = solve_mrf(*problem.inputs, form=form, solver="direct").disparity
+        np.testing.assert_allclose(refined, expected, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_gradients_agree_with_finite_differences(form):
+    problem = random_problem(7, 6, seed=3, style="smooth")
+    disparity, confidence, gradient, image = batch([problem])
+    weights = image_weights(image, 2.55, torch.float64)
+    confidence = 0.1 + 0.8 * confidence  # away from the floor, where there is a kink
+    inputs = (disparity, confidence, gradient, weights.phi_x, weights.phi_y, weights.neighbors)
+    inputs = tuple(each.clone().requires_grad_() for each in inputs)
+
+    def solved(d, c, g, phi_x, phi_y, w):
+        return refine_batch(d, c, g, ImageWeights(phi_x, phi_y, w), form=form, tolerance=1e-12)
+
+    assert torch.autograd.gradcheck(solved, inputs, eps=1e-5, atol=1e-4, rtol=1e-4, fast_mode=True)
+
+
+def test_descending_the_gradients_finds_a_confidence_that_helps():
+    y, x = np.mgrid[:12, :14].astype(float)
+    truth = torch.from_numpy(10 + 0.2 * x - 0.1 * y)[None]
+    disparity = truth.clone()
+    disparity[:, 4:8, 5:9] += 6
+    slopes = torch.tensor([0.2, -0.1], dtype=torch.float64)[None, :, None, None].expand(1, 2, 12, 14)
+    weights = image_weights(torch.full((1, 3, 12, 14), 90, dtype=torch.uint8), 2.55, torch.float64)
+    score = torch.zeros_like(disparity, requires_grad=True)
+    optimizer = torch.optim.Adam([score], lr=0.3)
+    losses = []
+    for _ in range(25):
+        refined = refine_batch(disparity, score.sigmoid(), slopes, weights)
+        loss = (refined - truth).abs().mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        losses.append(loss.item())
+    assert losses[-1] < 0.2 * losses[0]
+    wrong = (disparity - truth).abs() > 1
+    assert score.sigmoid()[wrong].mean() < 0.2 < 0.6 < score.sigmoid()[~wrong].mean()
+
+
+def test_what_does_not_converge_says_so(monkeypatch):
+    import refine.differentiable
+
+    monkeypatch.setattr(refine.differentiable, "MAX_ITERATIONS", 2)
+    disparity, confidence, gradient, image = batch([random_problem(20, 20, seed=4)])
+    with pytest.raises(SolverError, match="short of"):
+        refine_batch(disparity, confidence, gradient, image_weights(image, 2.55, torch.float64))
+
+
+def test_bad_batches_are_named():
+    disparity, confidence, gradient, image = batch([random_problem(5, 4, seed=5)])
+    weights = image_weights(image, 2.55, torch.float64)
+    with pytest.raises(ValueError, match=r"do not fit"):
+        refine_batch(disparity, confidence, gradient.permute(0, 2, 3, 1), weights)
+    disparity[0, 0, 0] = torch.nan
+    with pytest.raises(ValueError, match="finite"):
+        refine_batch(disparity, confidence, gradient, weights, MRFParameters())
