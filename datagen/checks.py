@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from datagen.ground_truth import (
     OCCLUDED,
@@ -87,7 +88,7 @@ def check_views(
     """The two views' disparities and the labels agree, seen from `eye`.
 
     A visible point has in the other view a disparity between those of the two pixels it falls between; an
-    occluded one falls on something nearer; one is out of the frame if its x says so.
+    occluded one falls on or beside something nearer; one is out of the frame if its x says so.
     """
     x, low, high = _in_other_view(eye, disparity, other_disparity)
     width = disparity.shape[1]
@@ -103,8 +104,10 @@ def check_views(
         MAX_INCONSISTENT,
         "visible pixels have another disparity than the other view has there",
     )
+    # What hides a point may be thinner than a pixel and miss the centres next to it: look one pixel further.
+    _, _, nearest = _in_other_view(eye, disparity, maximum_filter(other_disparity, size=3))
     yield from _too_many(
-        (high <= disparity + NEARER_PX)[occlusion == OCCLUDED],
+        (nearest <= disparity + NEARER_PX)[occlusion == OCCLUDED],
         MAX_INCONSISTENT,
         "occluded pixels have nothing nearer before them in the other view",
     )

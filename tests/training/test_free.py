@@ -52,8 +52,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run folder with both networks, trained without a regressor on four pairs."""
     data = write_dataset(tmp_path_factory.mktemp("set"), 0, train=4, val=2)
     folder = tmp_path_factory.mktemp("run")
-    for task in ("confnet_free", "gradnet_free"):
-        train(task, [(data, 1.0)], folder, quick(task), steps=150, progress=False)
+    for task, steps in {"confnet_free": 150, "gradnet_free": 300}.items():
+        train(task, [(data, 1.0)], folder, quick(task), steps=steps, progress=False)
     return folder
 
 

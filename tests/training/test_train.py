@@ -86,8 +86,8 @@ def test_overfits_four_samples(data: Path, tmp_path: Path) -> None:
         train(task, [(data, 1.0)], tmp_path, presets[task], steps=steps, progress=False)
         losses = scalars(tmp_path, task, "train/loss")
         final[task] = losses[max(losses)]
-    # A weighted sum over six scales whose weights add up to 2: under 0.85 px on average.
-    assert final["regressor"] < 1.7
+    # A weighted sum over six scales whose weights add up to 2: under 1.1 px on average.
+    assert final["regressor"] < 2.2
     assert final["confnet"] < 0.3
     assert final["gradnet"] < 0.04
 
