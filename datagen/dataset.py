@@ -21,11 +21,14 @@ from datagen.formats import (
     read_pfm,
     read_png,
 )
+from datagen.formats.limits import read_bounded
 from datagen.formats.png import read_png_size
 from datagen.layout import EYES, RENDER_PASSES, SPLITS, Direction, Eye, Layout
 from datagen.manifest import read_manifest
+from datagen.mirror import open_mirror
 from scenes import Scene, scene_from_json
 from scenes.assets import use_store
+from storage import LocalTree, open_tree
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class StereoSample:
     @property
     def name(self) -> str:
         """Split, scene and frame, for example `TEST/A/0003/0006`."""
-        left = self._file(self._image_kind, "left")
+        left = self.layout.file(self._image_kind, self.split, self.scene, "left", self.frame)
         split, group, scene, _, _ = left.parts[-5:]
         return "/".join((split, group, scene, left.stem))
 
@@ -164,7 +167,7 @@ class StereoSample:
     @cached_property
     def scene_record(self) -> Scene:
         """The world that was rendered, with its camera."""
-        return read_scene(self.layout.scene_record(self.split, self.scene))
+        return read_scene(self.layout.local(self.layout.scene_record(self.split, self.scene)))
 
     @cached_property
     def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -179,7 +182,8 @@ class StereoSample:
         return RENDER_PASSES[self.render_pass]
 
     def _file(self, kind: str, eye: Eye, direction: Direction | None = None) -> Path:
-        return self.layout.file(kind, self.split, self.scene, eye, self.frame, direction)
+        path = self.layout.file(kind, self.split, self.scene, eye, self.frame, direction)
+        return self.layout.local(path)
 
     def _image(self, eye: Eye) -> NDArray[np.uint8]:
         path = self._file(self._image_kind, eye)
@@ -240,7 +244,7 @@ class StereoDataset(Sequence[StereoSample]):
         """Find the frames; no array is read yet.
 
         Args:
-            root: The data set's folder.
+            root: The data set's folder, or a URL; files behind a URL are copied to a cache at first use.
             split: "train", "val" or "test".
             render_pass: Which images to read, "clean" or "final".
 
@@ -284,7 +288,7 @@ class StereoDataset(Sequence[StereoSample]):
         manifest = self.layout.manifest(self.split, scene)
         folder = self.layout.scene_folder(RENDER_PASSES[self.render_pass], self.split, scene) / "left"
         prefix = f"{self.layout.relative(folder)}/"
-        names = (entry.path for entry in read_manifest(manifest).files)
+        names = (entry.path for entry in read_manifest(self.layout.local(manifest)).files)
         frames = sorted(int(Path(name).stem) for name in names if name.startswith(prefix))
         if not frames:
             raise DatasetError(f"{manifest}: lists no image of the {self.render_pass} pass")
@@ -292,8 +296,14 @@ class StereoDataset(Sequence[StereoSample]):
 
 
 def open_layout(root: Path | str) -> Layout:
-    """The layout of an existing data set. Raises DatasetError for a folder that is missing or is none."""
-    layout = Layout(Path(root))
+    """The layout of an existing data set, in a folder or behind a URL.
+
+    Raises DatasetError for a folder that is missing or is none.
+    """
+    tree = open_tree(root)
+    if not isinstance(tree, LocalTree):
+        return open_mirror(tree)
+    layout = Layout(tree.root)
     if not layout.root.is_dir():
         raise DatasetError(f"{layout.root}: there is no such folder")
     if not layout.recipe.is_file():
@@ -305,10 +315,10 @@ def read_scene(path: Path) -> Scene:
     """Read a Scene record of a data set. Raises DatasetError for one that is missing or describes no scene."""
     use_store(Layout(path.parents[3]).assets)
     try:
-        return scene_from_json(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
+        return scene_from_json(read_bounded(path).decode("utf-8"))
+    except DatasetError:
+        raise
+    except (ValueError, RecursionError) as error:
         raise DatasetError(f"{path}: is not a scene ({error})") from error
 
 

@@ -9,3 +9,7 @@ class DatasetError(ValueError):
 
 class FormatError(DatasetError):
     """A file's bytes are not what its format allows, or an array cannot be stored in the format."""
+
+
+class DiskFullError(DatasetError):
+    """There is no room for what should be written; what is there is whole."""

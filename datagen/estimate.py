@@ -11,7 +11,8 @@ from datagen.errors import DatasetError
 from datagen.layout import KINDS, SPLITS, Layout
 from datagen.manifest import SceneManifest, read_manifest
 from datagen.recipe import Recipe
-from datagen.render import render_dataset
+from datagen.render import committed_scenes, render_dataset
+from storage import open_tree
 
 ONCE_A_SCENE = ("sample", "build")
 """The steps of a scene that its number of frames does not lengthen."""
@@ -46,9 +47,9 @@ def estimate_run(
     Writes nothing under `root`. Scenes are alike only on average, so the time is good to a factor of two.
     Raises DatasetError if that frame cannot be rendered.
     """
-    layout = Layout(Path(root))
+    committed = committed_scenes(open_tree(root))
     wanted = {split: set(range(shard[0], count, shard[1])) for split, count in recipe.scenes.items()}
-    there = {split: set(layout.committed_scenes(split)) for split in SPLITS}
+    there = {split: {scene for where, scene in committed if where == split} for split in SPLITS}
     missing = {split: len(numbers - there[split]) for split, numbers in wanted.items()}
     already = sum(len(numbers & there[split]) for split, numbers in wanted.items())
     frames = recipe.world.frames * sum(missing.values())
@@ -68,7 +69,7 @@ def _measured(recipe: Recipe, split: str, device: str) -> SceneManifest:
     with tempfile.TemporaryDirectory(prefix="stereoforge-estimate-") as folder:
         summary = render_dataset(one, folder, workers=1, device=device)
         if summary.failures:
-            raise DatasetError(f"the scene to measure could not be rendered: {summary.failures[0]}")
+            raise DatasetError(f"the scene to measure could not be rendered: {summary.failures[0].reason}")
         return read_manifest(Layout(Path(folder)).manifest(split, 0))
 
 

@@ -26,6 +26,7 @@ from datagen.layout import EYES, Direction, Eye
 from datagen.scene_geometry import SceneGeometry
 from datagen.surface_targets import ExtraTargets
 from scenes import Scene
+from workers import captured_output
 
 BLENDER_LOG = "blender.log"
 LOG_LINES_SHOWN = 5
@@ -95,9 +96,9 @@ def render_frames(
 ) -> Generator[tuple[int, dict[Eye, EyeTargets]], None, None]:
     """Yield (frame, both eyes' arrays) for every frame of a scene, frames counted from 0.
 
-    scratch: an existing folder for Blender's temporary files and its log. geometry: the scene's, if it has
-    been built already. Blender keeps one world a process, so one iterator at a time. Raises BlenderError, and
-    RuntimeError on a Python without bpy.
+    scratch: an existing folder for Blender's temporary files and, outside worker processes, its log.
+    geometry: the scene's, if it has been built already. Blender keeps one world a process, so one iterator at
+    a time. Raises BlenderError, and RuntimeError on a Python without bpy.
     """
     # Imported here so that planning, verifying and training work on a Python without Blender.
     from datagen.blender.build import build_world, place
@@ -107,7 +108,7 @@ def render_frames(
     from datagen.blender.view import render_view
 
     options, watch = options or RenderOptions(), watch or Stopwatch()
-    log = scratch / BLENDER_LOG
+    log = captured_output() or scratch / BLENDER_LOG
     exposure: float | None = None
     try:
         with watch.step("build"), quiet(log):

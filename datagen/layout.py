@@ -12,11 +12,13 @@ Frames are numbered from `FIRST_FRAME`, as in FlyingThings3D; that file shows th
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from datagen.errors import DatasetError
+from storage import LocalTree, Tree
 
 SPLITS = ("train", "val", "test")
 Eye = Literal["left", "right"]
@@ -76,7 +78,7 @@ _RECORD_NAME = re.compile(r"(\d{4}|[1-9]\d{4,})\.json")
 
 @dataclass(frozen=True)
 class Layout:
-    """The paths of a data set under its root folder; nothing here touches the disk but `committed_scenes`."""
+    """The paths of a data set under its root folder; only `local` and `committed_scenes` touch the disk."""
 
     root: Path
 
@@ -117,6 +119,11 @@ class Layout:
     def manifest(self, split: str, scene: int) -> Path:
         return self._group("manifest", split) / f"{_number(scene)}.json"
 
+    def scene_paths(self, split: str, scene: int) -> list[Path]:
+        """All that a scene consists of, its folders first and its manifest last."""
+        folders = [self.scene_folder(kind, split, scene) for kind in KINDS]
+        return [*folders, self.scene_record(split, scene), self.manifest(split, scene)]
+
     @property
     def assets(self) -> Path:
         """The folder of the user's own files, prepared (`datagen.assets`)."""
@@ -126,13 +133,18 @@ class Layout:
     def recipe(self) -> Path:
         return self.root / "recipe.yaml"
 
+    @property
+    def tree(self) -> Tree:
+        """Where the files are."""
+        return LocalTree(self.root)
+
+    def local(self, path: Path) -> Path:
+        """Make sure that a path of this layout can be read, if there is such a file; return it."""
+        return path
+
     def committed_scenes(self, split: str) -> list[int]:
         """The numbers of the scenes that are whole, ascending: those that have a manifest."""
-        folder = self._group("manifest", split)
-        if not folder.is_dir():
-            return []
-        names = (_RECORD_NAME.fullmatch(path.name) for path in folder.iterdir())
-        return sorted(int(name[1]) for name in names if name)
+        return scene_numbers(self.tree.files_in(self.relative(self._group("manifest", split))))
 
     def relative(self, path: Path) -> str:
         """A path under the root as the manifest writes it: relative, with forward slashes."""
@@ -142,6 +154,12 @@ class Layout:
         if split not in SPLITS:
             raise DatasetError(f"{self.root}: there is no split {split!r}; there are {', '.join(SPLITS)}")
         return self.root / folder / split.upper() / LETTER
+
+
+def scene_numbers(names: Iterable[str]) -> list[int]:
+    """The scenes whose records or manifests have these file names, ascending; other names are left out."""
+    matches = (_RECORD_NAME.fullmatch(name) for name in names)
+    return sorted(int(match[1]) for match in matches if match)
 
 
 def _number(value: int) -> str:

@@ -16,6 +16,9 @@ from storage import write_text
 T = TypeVar("T")
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
+_OWN_DIGEST = "manifest_sha256"
+_NO_DIGEST = "0" * 64
+_NO_DIGEST_AT_END = re.compile(rf'"{_NO_DIGEST}"\n\}}\n\Z')
 
 
 @dataclass(frozen=True)
@@ -64,19 +67,36 @@ def file_entry(root: Path, path: Path) -> FileEntry:
 
 def write_manifest(path: Path, manifest: SceneManifest) -> None:
     """Commit a scene: all its files must be in place before."""
-    write_text(path, json.dumps(asdict(manifest), indent=1) + "\n")
+    write_text(path, seal(asdict(manifest)))
+
+
+def seal(record: dict[str, Any]) -> str:
+    """A record as JSON with the text's own SHA-256 at its end, taken with zeros in that place."""
+    text = json.dumps(record | {_OWN_DIGEST: _NO_DIGEST}, indent=1) + "\n"
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return _NO_DIGEST_AT_END.sub(f'"{digest}"\n}}\n', text)
 
 
 def read_manifest(path: Path) -> SceneManifest:
     """Read a manifest. Raises DatasetError with one sentence for a file that is not one."""
     try:
-        data = json.loads(read_bounded(path))
+        content = read_bounded(path)
+        data = json.loads(content)
+        digest = data.pop(_OWN_DIGEST, None)
         files = tuple(_typed(FileEntry, _FILE_TYPES, entry) for entry in _as_list(data.pop("files")))
-        return _typed(SceneManifest, _MANIFEST_TYPES, data | {"files": files})
+        manifest = _typed(SceneManifest, _MANIFEST_TYPES, data | {"files": files})
+        _check_seal(content, digest)
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}" if str(path) not in str(error) else str(error)) from error
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise DatasetError(f"{path}: is not a scene's manifest ({error})") from error
+    return manifest
+
+
+def _check_seal(content: bytes, digest: Any) -> None:
+    plain = content.replace(str(digest).encode(), _NO_DIGEST.encode())
+    if hashlib.sha256(plain).hexdigest() != digest:
+        raise DatasetError("is damaged, its SHA-256 is not the one it carries")
 
 
 _FILE_TYPES: dict[str, type] = {"path": str, "size": int, "sha256": str}

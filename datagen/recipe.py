@@ -19,6 +19,8 @@ from scenes.assets import AssetPool
 from scenes.serialization import from_plain, to_plain
 from storage import write_text
 
+MAX_RECIPE_BYTES = 1 << 20
+
 
 @dataclass(frozen=True)
 class Recipe:
@@ -99,26 +101,41 @@ def recipe_from_plain(data: Any, origin: str) -> Recipe:
     """Raises DatasetError naming `origin` for anything that is not a recipe."""
     try:
         return from_plain(data, Recipe)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DatasetError(f"{origin} is not a valid recipe: {error}") from error
+
+
+def recipe_from_text(text: bytes, origin: str) -> Recipe:
+    """Raises DatasetError naming `origin` for bytes that are no YAML, or no recipe."""
+    if len(text) > MAX_RECIPE_BYTES:
+        raise DatasetError(f"cannot read the recipe {origin}: {len(text)} bytes are more than any recipe has")
+    try:
+        data = yaml.safe_load(text.decode("utf-8"))
+    except (UnicodeDecodeError, yaml.YAMLError, RecursionError, ValueError) as error:
+        raise DatasetError(f"cannot read the recipe {origin}: {' '.join(str(error).split())}") from error
+    return recipe_from_plain(data, origin)
 
 
 def read_recipe(path: Path) -> Recipe:
     """Raises DatasetError for a file that is missing, no YAML, or no recipe."""
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = path.read_bytes()
     except FileNotFoundError as error:
         raise DatasetError(f"there is no recipe {path}") from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise DatasetError(f"cannot read the recipe {path}: {' '.join(str(error).split())}") from error
-    return recipe_from_plain(data, str(path))
+    except OSError as error:
+        raise DatasetError(f"cannot read the recipe {path}: {error.strerror}") from error
+    return recipe_from_text(text, str(path))
+
+
+def recipe_to_text(recipe: Recipe) -> str:
+    return yaml.safe_dump(to_plain(recipe), sort_keys=False)
 
 
 def write_recipe(path: Path, recipe: Recipe) -> None:
-    write_text(path, yaml.safe_dump(to_plain(recipe), sort_keys=False))
+    write_text(path, recipe_to_text(recipe))
 
 
-def merge_into(existing: Recipe, wanted: Recipe, folder: Path) -> Recipe:
+def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
     """The recipe of a folder that already has one: scenes may be added, nothing else may change.
 
     Raises DatasetError naming the first setting that differs.

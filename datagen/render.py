@@ -3,17 +3,39 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
+import shutil
+from collections.abc import Callable, Collection, Iterator
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from datagen.errors import DatasetError
-from datagen.executors import Executor, LocalExecutor
-from datagen.layout import Layout
+from datagen.errors import DatasetError, DiskFullError
+from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
+from datagen.executors.devices import assign_devices, find_gpus
+from datagen.layout import SPLITS, Layout, scene_numbers
 from datagen.manifest import SceneManifest
-from datagen.recipe import Recipe, merge_into, read_recipe, write_recipe
-from datagen.scene_job import STAGING_FOLDER, SceneJob, render_scene
+from datagen.quarantine import (
+    QuarantinedScene,
+    put_in_quarantine,
+    quarantined_scenes,
+    read_quarantined,
+    release,
+)
+from datagen.recipe import Recipe, merge_into, recipe_from_text, write_recipe
+from datagen.run_log import RunLog, run_log
+from datagen.scene_job import SceneJob, render_scene
+from datagen.staging import STAGING_FOLDER, StagingArea, staging_area
+from storage import LocalTree, Tree, open_tree
+from workers import Limits, available_memory_bytes
+
+SCENE_TIMEOUT_S = 1800.0
+MEMORY_SHARE = 0.8
+"""Of the machine's memory, for all workers together."""
+NO_ROOM_BYTES = 16 << 20
+"""A failure with less room than this is the disk's: Blender does not say so itself."""
+
+Scene = tuple[str, int]
+"""(split, number)."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +46,8 @@ class RenderSummary:
     """The folder's recipe after the run."""
     rendered: int
     already_there: int
-    failures: tuple[tuple[str, str], ...]
-    """(scene, one sentence) for every scene that could not be rendered."""
+    failures: tuple[QuarantinedScene, ...]
+    """Every scene asked for that is in quarantine now, from this run or an earlier one."""
 
 
 def render_dataset(
@@ -36,50 +58,168 @@ def render_dataset(
     device: str = "cpu",
     shard: tuple[int, int] = (0, 1),
     executor: Executor | None = None,
+    only: Collection[Scene] | None = None,
     on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
 ) -> RenderSummary:
     """Render what is missing of a recipe under `root`; running it again finishes or extends the data set.
 
-    workers: processes, default one a core. shard: (i, n) renders only every n-th scene from the i-th, so that
-    n machines can share a folder. on_scene: called with (done, total, manifest or None if it failed).
+    A scene that crashes, hangs, exceeds its memory or raises an error goes to quarantine with its record and
+    log, the others go on; later runs leave it alone unless it is named in `only`.
 
-    Raises DatasetError if the folder holds something else: other files, or a data set of other settings.
+    root: a folder, or a URL that fsspec knows, such as s3://bucket/folder. workers: processes, default one a
+    core or one a GPU. shard: (i, n) renders only every n-th scene from the i-th, so that n machines can share
+    a folder. only: render these (split, number) if they are missing, and nothing else. on_scene: called with
+    (done, total, manifest or None if it failed).
+
+    Raises DatasetError if the folder holds something else: other files, or a data set of other settings; and
+    DiskFullError, with the data set as whole as it is, when there is no room for more.
     """
-    root = Path(root)
-    recipe = _claim(root, recipe)
-    cores = len(os.sched_getaffinity(0))
-    workers = cores if workers is None else workers
-    threads = max(1, cores // workers)
+    tree = open_tree(root)
     wanted = list(_wanted(recipe, shard))
-    missing = [job for job in wanted if not Layout(root).manifest(*job).is_file()]
-    jobs = [SceneJob(root, recipe, split, scene, device, threads) for split, scene in missing]
-    executor = executor or LocalExecutor(workers=min(workers, max(1, len(jobs))))
-    failures: list[tuple[str, str]] = []
-    with closing(executor.run(render_scene, jobs)) as outcomes:
-        for done, outcome in enumerate(outcomes, start=1):
-            if outcome.error is not None:
-                failures.append((outcome.job.name, outcome.error))
-            if on_scene:
-                on_scene(done, len(jobs), outcome.result)
-    with suppress(OSError):  # another shard may still be using it
-        (root / STAGING_FOLDER).rmdir()
-    return RenderSummary(recipe, len(jobs) - len(failures), len(wanted) - len(jobs), tuple(failures))
+    merged = _merge(tree, recipe)
+    executor = executor or local_executor(workers, device)
+    with staging_area(tree) as area, run_log(tree, area.folder) as log:
+        _write_recipe(tree, area, merged)
+        quarantined = set(quarantined_scenes(tree))
+        present = committed_scenes(tree)
+        chosen = set(wanted) - quarantined if only is None else set(only)
+        missing = [scene for scene in wanted if scene in chosen and scene not in present]
+        jobs = [SceneJob(tree, area, recipe, *scene, device, executor.threads) for scene in missing]
+        run = _Run(tree, recipe, log, quarantined, len(jobs), on_scene)
+        run.go(executor, jobs)
+    failures = tuple(read_quarantined(tree, *scene) for scene in wanted if scene in run.quarantined)
+    already_there = sum(scene in present for scene in wanted)
+    return RenderSummary(replace(merged, scenes=recipe.scenes), run.rendered, already_there, failures)
 
 
-def _claim(root: Path, recipe: Recipe) -> Recipe:
-    """Write the recipe into a new folder, or extend the one that is there."""
-    path = Layout(root).recipe
-    if path.exists():
-        merged = merge_into(read_recipe(path), recipe, root)
-    elif root.is_dir() and any(root.iterdir()):
-        raise DatasetError(f"{root} is neither empty nor a data set; give a new or empty folder")
-    else:
-        merged = recipe
-    write_recipe(path, merged)
-    return replace(merged, scenes=recipe.scenes)
+def local_executor(
+    workers: int | None = None,
+    device: str = "cpu",
+    timeout_s: float = SCENE_TIMEOUT_S,
+    memory_bytes: int | None = None,
+) -> LocalExecutor:
+    """Worker processes of this machine: one a core or one a GPU, which together fit into its memory.
+
+    timeout_s, memory_bytes: what one scene may use, and the memory by default its worker's share.
+    """
+    cores = len(os.sched_getaffinity(0))
+    gpus = find_gpus(device, os.environ)
+    environments = assign_devices(device, gpus, workers if gpus else workers or cores)
+    share = int(MEMORY_SHARE * available_memory_bytes() / len(environments))
+    return LocalExecutor(environments, WorkerPolicy(Limits(timeout_s, memory_bytes or share)))
 
 
-def _wanted(recipe: Recipe, shard: tuple[int, int]) -> Iterator[tuple[str, int]]:
+def ray_executor(
+    address: str | None = None,
+    workers: int | None = None,
+    device: str = "cpu",
+    timeout_s: float = SCENE_TIMEOUT_S,
+    memory_bytes: int | None = None,
+) -> RayExecutor:
+    """Workers of a Ray cluster: one a CPU, or one a GPU.
+
+    memory_bytes: what one scene may use; no limit by default, since the machines of a cluster differ.
+    """
+    policy = WorkerPolicy(Limits(timeout_s, memory_bytes))
+    return RayExecutor(address, workers, gpus_per_job=0.0 if device == "cpu" else 1.0, policy=policy)
+
+
+@dataclass
+class _Run:
+    """The outcomes of a run as they come: counted, logged, quarantined."""
+
+    tree: Tree
+    recipe: Recipe
+    log: RunLog
+    quarantined: set[Scene]
+    total: int
+    on_scene: Callable[[int, int, SceneManifest | None], None] | None
+    rendered: int = 0
+    bytes_written: int = 0
+
+    def go(self, executor: Executor, jobs: list[SceneJob]) -> None:
+        settings = self.recipe.settings_sha256()
+        self.log.write("run_started", scenes=self.total, executor=repr(executor), recipe_sha256=settings)
+        try:
+            with closing(executor.run(render_scene, jobs)) as outcomes:
+                for done, outcome in enumerate(outcomes, start=1):
+                    self._take(outcome)
+                    if self.on_scene:
+                        self.on_scene(done, self.total, outcome.result)
+        except BaseException as error:
+            self.log.write("run_stopped", rendered=self.rendered, why=f"{type(error).__name__}: {error}")
+            raise
+        self.log.write("run_finished", rendered=self.rendered, failed=self.total - self.rendered)
+
+    def _take(self, outcome: Outcome[SceneJob, SceneManifest]) -> None:
+        scene = (outcome.job.split, outcome.job.scene)
+        if outcome.result is not None:
+            self._take_scene(scene, outcome.result, outcome.attempts)
+            return
+        assert outcome.failure is not None
+        failure = outcome.failure
+        self.log.write(
+            "scene_failed",
+            scene=outcome.job.name,
+            kind=failure.kind,
+            reason=failure.sentence,
+            attempts=outcome.attempts,
+        )
+        if failure.kind == "disk_full" or self._no_room_left():
+            raise DiskFullError(self._disk_full_sentence())
+        put_in_quarantine(self.tree, self.recipe, *scene, failure, outcome.attempts)
+        self.quarantined.add(scene)
+
+    def _take_scene(self, scene: Scene, manifest: SceneManifest, attempts: int) -> None:
+        size = sum(entry.size for entry in manifest.files)
+        self.rendered += 1
+        self.bytes_written += size
+        if scene in self.quarantined:
+            release(self.tree, *scene)
+            self.quarantined.remove(scene)
+        name = f"{scene[0]}/{scene[1]:04d}"
+        self.log.write("scene_committed", scene=name, bytes=size, seconds=manifest.seconds, attempts=attempts)
+
+    def _no_room_left(self) -> bool:
+        return isinstance(self.tree, LocalTree) and shutil.disk_usage(self.tree.root).free < NO_ROOM_BYTES
+
+    def _disk_full_sentence(self) -> str:
+        left = self.total - self.rendered
+        need = f", about {left * self.bytes_written / self.rendered / 1e6:.0f} MB" if self.rendered else ""
+        return (
+            f"{self.tree.name}: the disk is full; {left} scenes are missing{need}: make room and run the same "
+            "command again"
+        )
+
+
+def _merge(tree: Tree, recipe: Recipe) -> Recipe:
+    """The recipe of a new place, or the one that is there with what `recipe` adds. Changes nothing."""
+    name = Layout(Path()).recipe.name
+    if tree.exists(name):
+        existing = recipe_from_text(tree.read(name), f"{tree.name}/{name}")
+        return merge_into(existing, recipe, tree.name)
+    if set(tree.files_in("")) - {STAGING_FOLDER}:
+        raise DatasetError(f"{tree.name} is neither empty nor a data set; give a new or empty folder")
+    return recipe
+
+
+def _write_recipe(tree: Tree, area: StagingArea, recipe: Recipe) -> None:
+    """By way of the staging area, so that a run killed meanwhile leaves no temporary file."""
+    staged = Layout(area.folder).recipe
+    write_recipe(staged, recipe)
+    if not tree.exists(staged.name) or tree.read(staged.name) != staged.read_bytes():
+        tree.adopt(staged, staged.name)
+
+
+def committed_scenes(tree: Tree) -> set[Scene]:
+    """Every scene that is whole."""
+    folders = {split: Layout(Path()).manifest(split, 0).parent.as_posix() for split in SPLITS}
+    return {
+        (split, scene) for split, folder in folders.items() for scene in scene_numbers(tree.files_in(folder))
+    }
+
+
+def _wanted(recipe: Recipe, shard: tuple[int, int]) -> Iterator[Scene]:
     index, count = shard
     if not 0 <= index < count:
         raise DatasetError(f"shard {index}/{count} does not exist: it takes 0 <= I < N")

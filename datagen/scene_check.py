@@ -61,7 +61,7 @@ class SceneCheck:
         path = self.layout.manifest(self.split, self.scene)
         self.known.add(self.layout.relative(path))
         try:
-            manifest = read_manifest(path)
+            manifest = read_manifest(self.layout.local(path))
         except DatasetError as error:
             self._failed(error)
             return self
@@ -78,6 +78,10 @@ class SceneCheck:
                 caster = SceneRayCaster(SceneGeometry(scene)) if self.sampled_pixels else None
                 self._check_contents(scene, caster)
         return self
+
+    def could_not_run(self, sentence: str) -> None:
+        """Note that the process that ran this check did not survive it."""
+        self._found(self.layout.scene_record(self.split, self.scene), f"could not be checked: {sentence}")
 
     def _found(self, path: Path, message: str) -> None:
         self.problems.append(Problem(self.layout.relative(path), message, self.split, self.scene))
@@ -98,7 +102,7 @@ class SceneCheck:
         path = self.layout.root / entry.path
         self.files += 1
         try:
-            with path.open("rb") as file:
+            with self.layout.local(path).open("rb") as file:
                 digest = hashlib.file_digest(file, "sha256").hexdigest()
                 size = file.tell()
         except OSError as error:

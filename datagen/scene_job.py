@@ -31,18 +31,20 @@ from datagen.layout import FIRST_FRAME, RENDER_PASSES, Direction, Eye, Layout
 from datagen.manifest import SceneManifest, file_entry, write_manifest
 from datagen.recipe import Recipe
 from datagen.scene_geometry import SceneGeometry
+from datagen.staging import StagingArea
 from scenes import Scene, scene_to_json
 from scenes.assets import UserEnvironment, UserMesh, UserTexture, use_store
-from storage import write_text
-
-STAGING_FOLDER = ".staging"
+from storage import LocalTree, Tree, write_text
 
 
 @dataclass(frozen=True)
 class SceneJob:
     """One scene to render, and with what."""
 
-    root: Path
+    tree: Tree
+    """Where the data set is."""
+    area: StagingArea
+    """Where the scene is made."""
     recipe: Recipe
     split: str
     scene: int
@@ -53,37 +55,35 @@ class SceneJob:
     def name(self) -> str:
         return f"{self.split}/{self.scene:04d}"
 
-    @property
-    def staging(self) -> Path:
-        return self.root / STAGING_FOLDER / f"{self.split}-{self.scene:04d}"
-
 
 def render_scene(job: SceneJob) -> SceneManifest:
     """Render, measure and commit one scene.
 
-    Everything is written under a staging folder first and moved into place at the end, the manifest last,
-    so that a scene with a manifest is whole whatever happens.
+    Everything is written to a staging folder first and moved into place at the end, the manifest last, so
+    that a scene with a manifest is whole whatever happens.
     """
-    shutil.rmtree(job.staging, ignore_errors=True)
-    job.staging.mkdir(parents=True)
+    staging = job.area.scene_folder(job.split, job.scene)
     try:
-        return _render_staged(job, Stopwatch())
+        watch = Stopwatch()
+        statistics = _render_staged(job, staging, watch)
+        return _commit(job, staging, watch, statistics)
     finally:
-        shutil.rmtree(job.staging, ignore_errors=True)
+        shutil.rmtree(staging, ignore_errors=True)
 
 
-def _render_staged(job: SceneJob, watch: Stopwatch) -> SceneManifest:
-    """Render the first attempt at the scene that is not degenerate."""
-    use_store(Layout(job.root).assets)
+def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, Any]:
+    """Stage the first attempt at the scene that is not degenerate, all files but its manifest; its statistics."""
+    if isinstance(job.tree, LocalTree):
+        use_store(Layout(job.tree.root).assets)
     rejected: Counter[str] = Counter()
     for attempt in range(job.recipe.curation.attempts):
         with watch.step("sample"):
             geometry = SceneGeometry(job.recipe.sample(job.split, job.scene, attempt))
             fault = fault_before_rendering(geometry, job.recipe.curation)
-        frames = None if fault else _render_attempt(job, geometry, watch)
+        frames = None if fault else _render_attempt(job, staging, geometry, watch)
         if frames is not None:
             statistics = _scene_statistics(geometry.scene, frames, rejected)
-            return _commit(job, watch, statistics | {"assets": _assets_used(job.recipe, geometry.scene)})
+            return statistics | {"assets": _assets_used(job.recipe, geometry.scene)}
         rejected[fault or TEXTURELESS] += 1
     reasons = ", ".join(f"{reason} ({count})" for reason, count in rejected.most_common())
     raise DatasetError(
@@ -92,15 +92,15 @@ def _render_staged(job: SceneJob, watch: Stopwatch) -> SceneManifest:
 
 
 def _render_attempt(
-    job: SceneJob, geometry: SceneGeometry, watch: Stopwatch
+    job: SceneJob, staging: Path, geometry: SceneGeometry, watch: Stopwatch
 ) -> list[dict[str, float]] | None:
     """Render and stage a scene; its frames' statistics, or None if its first picture is textureless."""
-    recipe, staged = job.recipe, Layout(job.staging)
+    recipe, staged = job.recipe, Layout(staging)
     options = RenderOptions(
         recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets, recipe.passes
     )
     statistics: list[dict[str, float]] = []
-    with closing(render_frames(geometry.scene, job.staging, options, watch, geometry)) as frames:
+    with closing(render_frames(geometry.scene, staging, options, watch, geometry)) as frames:
         for frame, targets in frames:
             if frame == 0 and is_textureless(next(iter(targets["left"].images.values())), recipe.curation):
                 return None
@@ -110,7 +110,7 @@ def _render_attempt(
                 statistics.append(_frame_statistics(targets["left"]))
     with watch.step("write"):
         _write_scene_files(staged, job, geometry.scene)
-    (job.staging / BLENDER_LOG).unlink()
+    (staging / BLENDER_LOG).unlink(missing_ok=True)
     return statistics
 
 
@@ -178,17 +178,32 @@ def _assets_used(recipe: Recipe, scene: Scene) -> list[str]:
     return sorted(a.name for a in (*pool.meshes, *pool.textures, *pool.environments) if a.sha256 in used)
 
 
-def _commit(job: SceneJob, watch: Stopwatch, statistics: dict[str, Any]) -> SceneManifest:
-    """Move the staged scene into the data set and make it exist by writing its manifest."""
+def _commit(job: SceneJob, staging: Path, watch: Stopwatch, statistics: dict[str, Any]) -> SceneManifest:
+    """Move the staged scene into the data set and make it exist by putting its manifest there."""
+    files = sorted(path for path in staging.rglob("*") if path.is_file())
+    manifest = _manifest(job, staging, files, watch, statistics)
+    staged_manifest = Layout(staging).manifest(job.split, job.scene)
+    write_manifest(staged_manifest, manifest)
+    name = staged_manifest.relative_to(staging).as_posix()
+    with job.area.committing(job.split, job.scene):
+        if not job.tree.exists(name):
+            for source in sorted({_unit(path, staging) for path in files}):
+                job.tree.adopt(source, source.relative_to(staging).as_posix())
+            job.tree.adopt(staged_manifest, name)
+    return manifest
+
+
+def _manifest(
+    job: SceneJob, staging: Path, files: list[Path], watch: Stopwatch, statistics: dict[str, Any]
+) -> SceneManifest:
     from datagen.blender.session import blender_version
 
-    files = sorted(path for path in job.staging.rglob("*") if path.is_file())
-    manifest = SceneManifest(
+    return SceneManifest(
         family=job.recipe.family,
         split=job.split,
         scene=job.scene,
         recipe_sha256=job.recipe.settings_sha256(),
-        files=tuple(file_entry(job.staging, path) for path in files),
+        files=tuple(file_entry(staging, path) for path in files),
         seconds=watch.seconds,
         statistics=statistics,
         versions={
@@ -197,14 +212,6 @@ def _commit(job: SceneJob, watch: Stopwatch, statistics: dict[str, Any]) -> Scen
             "numpy": np.__version__,
         },
     )
-    for source in sorted({_unit(path, job.staging) for path in files}):
-        target = job.root / source.relative_to(job.staging)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if target.is_dir():  # Left by a run that was killed between moving and writing the manifest.
-            shutil.rmtree(target)
-        source.replace(target)
-    write_manifest(Layout(job.root).manifest(job.split, job.scene), manifest)
-    return manifest
 
 
 def _unit(path: Path, root: Path) -> Path:

@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
+import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from datagen.dataset import open_layout
 from datagen.layout import KINDS, SPLITS, Layout
-from datagen.recipe import Recipe, read_recipe
+from datagen.mirror import MirroredLayout, open_mirror
+from datagen.quarantine import quarantined_scenes
+from datagen.recipe import Recipe, read_recipe, recipe_to_text
+from datagen.render import local_executor
 from datagen.scene_check import SAMPLED_PIXELS, Problem, SceneCheck
+from storage import LocalTree, open_tree
 
 FEW_SCENES = 8
 """Fewer scenes than this are checked before other processes would have started."""
+CHECK_TIMEOUT_S = 600.0
+"""Of one scene."""
 
 
 @dataclass(frozen=True)
 class VerifyReport:
     """What was looked at and what was found."""
 
-    root: Path
+    root: str
+    """Folder or URL."""
     scenes: int
     frames: int
     files: int
@@ -54,6 +60,7 @@ def verify_dataset(
     *,
     workers: int | None = None,
     sampled_pixels: int = SAMPLED_PIXELS,
+    only: Collection[tuple[str, int]] | None = None,
 ) -> VerifyReport:
     """Check every file and every frame of a data set.
 
@@ -63,32 +70,38 @@ def verify_dataset(
     with rays cast at the scene's meshes.
 
     Args:
-        root: The data set's folder.
+        root: The data set's folder, or a URL.
         progress: Called after each scene with (scenes done, scenes in all).
-        workers: Processes, one a core if None. Sets of under `FEW_SCENES` are checked in this process.
+        workers: Processes with limits of time and memory; None for one a core, or this process alone for sets
+            of under `FEW_SCENES`.
         sampled_pixels: Of each view, for the rays; 0 leaves the geometry out, which is most of the time.
+        only: Check these (split, scene) and nothing else.
 
     Raises:
         DatasetError: For a folder that is missing or no data set at all, or a recipe that cannot be read.
     """
     start = time.perf_counter()
-    layout = open_layout(root)
-    recipe = read_recipe(layout.recipe)
-    checks = [
-        SceneCheck(layout, recipe, split, scene, sampled_pixels)
-        for split in SPLITS
-        for scene in layout.committed_scenes(split)
-    ]
-    results = []
-    for result in _run(checks, workers):
-        results.append(result)
-        if progress is not None:
-            progress(len(results), len(checks))
-    problems = [problem for result in results for problem in result.problems]
-    problems += _unfinished(layout, recipe)
-    problems += _orphans(layout, (result.known for result in results))
+    with _opened(root) as layout:
+        recipe = read_recipe(layout.recipe)
+        checks = [
+            SceneCheck(layout, recipe, split, scene, sampled_pixels)
+            for split in SPLITS
+            for scene in layout.committed_scenes(split)
+            if only is None or (split, scene) in only
+        ]
+        results: list[SceneCheck] = []
+        for result in _run(checks, workers):
+            results.append(result)
+            if progress is not None:
+                progress(len(results), len(checks))
+        results.sort(key=lambda result: (SPLITS.index(result.split), result.scene))
+        problems = [problem for result in results for problem in result.problems]
+        if only is None:
+            problems += _recipe_problems(layout, recipe)
+            problems += _unfinished(layout, recipe)
+            problems += _orphans(layout, (result.known for result in results))
     return VerifyReport(
-        root=layout.root,
+        root=layout.tree.name,
         scenes=len(results),
         frames=sum(result.frames for result in results),
         files=sum(result.files for result in results),
@@ -98,15 +111,51 @@ def verify_dataset(
     )
 
 
-def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
-    """Run the checks, in order, on as many processes as are worth starting."""
-    workers = len(os.sched_getaffinity(0)) if workers is None else workers
-    if workers == 1 or len(checks) < FEW_SCENES:
-        yield from map(SceneCheck.run, checks)
+@contextmanager
+def _opened(root: Path | str) -> Iterator[Layout]:
+    """The layout of a folder; behind a URL, one with copies that are gone afterwards."""
+    tree = open_tree(root)
+    if isinstance(tree, LocalTree):
+        yield open_layout(root)
         return
-    # A fresh interpreter each: forking a process with threads of OpenCV or Embree in it can hang.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        yield from pool.map(SceneCheck.run, checks)
+    with tempfile.TemporaryDirectory(prefix="stereoforge-") as folder:
+        yield open_mirror(tree, Path(folder))
+
+
+def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
+    """Run the checks, as they end, in worker processes if they are worth starting or asked for."""
+    if workers is None and len(checks) < FEW_SCENES:
+        yield from map(_check, checks)
+        return
+    # A Scene record that nobody vouches for can ask for any mesh: what it takes to build is limited.
+    executor = local_executor(workers, timeout_s=CHECK_TIMEOUT_S)
+    with closing(executor.run(_check, checks)) as outcomes:
+        for outcome in outcomes:
+            if outcome.failure is None:
+                assert outcome.result is not None
+                yield outcome.result
+            else:
+                outcome.job.could_not_run(outcome.failure.sentence)
+                yield outcome.job
+
+
+def _check(check: SceneCheck) -> SceneCheck:
+    result = check.run()
+    if isinstance(check.layout, MirroredLayout):
+        check.layout.forget(check.split, check.scene)
+    return result
+
+
+def _recipe_problems(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
+    """Whether the recipe is byte for byte what was written, and has all the scenes that there are."""
+    name = layout.recipe.name
+    if layout.recipe.read_bytes() != recipe_to_text(recipe).encode():
+        yield Problem(name, "is not as it was written")
+    for split in SPLITS:
+        count = recipe.scenes.get(split, 0)
+        beyond = [scene for scene in layout.committed_scenes(split) if scene >= count]
+        if beyond:
+            yield Problem(name, f"has {count} {split} scenes, but there is scene {beyond[-1]}", split)
 
 
 def _unfinished(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
@@ -115,7 +164,9 @@ def _unfinished(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
         missing = sorted(set(range(count)) - set(layout.committed_scenes(split)))
         if missing:
             numbers = ", ".join(map(str, missing[:10])) + (", ..." if len(missing) > 10 else "")
-            message = f"{len(missing)} of the recipe's {count} {split} scenes are not finished ({numbers})"
+            failed = len(set(quarantined_scenes(layout.tree)) & {(split, scene) for scene in missing})
+            quarantined = f", {failed} of them in quarantine" if failed else ""
+            message = f"{len(missing)} of the recipe's {count} {split} scenes are not finished ({numbers}){quarantined}"
             yield Problem(layout.recipe.name, message, split)
 
 
@@ -123,7 +174,6 @@ def _orphans(layout: Layout, known_by_scene: Iterable[set[str]]) -> Iterator[Pro
     """Files in the data set's folders that belong to no finished scene."""
     known = set().union(*known_by_scene)
     for folder in (*KINDS, "scenes", "manifest"):
-        for path in sorted((layout.root / folder).rglob("*")):
-            name = layout.relative(path)
-            if not path.is_dir() and name not in known:
+        for name in layout.tree.files_below(folder):
+            if name not in known:
                 yield Problem(name, "belongs to no finished scene")

@@ -17,5 +17,7 @@ def render_all(recipe: Recipe, root: Path) -> None:
             recipe, root, on_scene=lambda done, total, _: progress.update(task, completed=done, total=total)
         )
     if summary.failures:
-        scene, reason = summary.failures[0]
-        raise CommandError(f"{len(summary.failures)} scenes could not be rendered, {scene} because {reason}")
+        first = summary.failures[0]
+        raise CommandError(
+            f"{len(summary.failures)} scenes could not be rendered, {first.name} because: {first.reason}"
+        )

@@ -15,8 +15,9 @@ from typing import Any, Generic, TypeVar
 
 import cattrs
 import safetensors.torch
+import torch
 from safetensors import SafetensorError
-from torch import nn
+from torch import Tensor, nn
 
 from storage import write_bytes, write_text
 from training.errors import TrainingError
@@ -24,6 +25,7 @@ from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, He
 
 Network = TypeVar("Network", bound=nn.Module)
 FORMAT = 1
+MAX_DESCRIPTION_BYTES = 1 << 20
 _CONVERTER = cattrs.Converter(forbid_extra_keys=True)
 
 
@@ -135,8 +137,10 @@ def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -
     if digest != description["sha256"]:
         raise TrainingError(f"{path}: damaged, or of another run than {description_path.name} beside it")
     try:
-        network = build(description["network"])
-        network.load_state_dict(safetensors.torch.load(content))
+        # Without memory of its own, the network takes no more than the file holds, whatever sizes it describes.
+        with torch.device("meta"):
+            network = build(description["network"])
+        _fill(network, safetensors.torch.load(content))
         training = _structure(description["training"], TrainingSummary)
     except (SafetensorError, RuntimeError, KeyError, ValueError, TypeError) as error:
         raise TrainingError(
@@ -146,10 +150,23 @@ def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -
     return StoredNetwork(network, digest, description["regressor_sha256"], training)
 
 
+def _fill(network: nn.Module, tensors: Mapping[str, Tensor]) -> None:
+    """Make the tensors the network's. Raises RuntimeError or ValueError where names, shapes or types differ."""
+    wanted = network.state_dict()
+    odd = [name for name, tensor in tensors.items() if name in wanted and tensor.dtype != wanted[name].dtype]
+    if odd:
+        raise ValueError(
+            f"{odd[0]} holds {tensors[odd[0]].dtype} where the network has {wanted[odd[0]].dtype}"
+        )
+    network.load_state_dict(tensors, assign=True)
+
+
 def _read_description(path: Path, task: str) -> dict[str, Any]:
     try:
+        if path.stat().st_size > MAX_DESCRIPTION_BYTES:
+            raise ValueError(f"{path.stat().st_size} bytes are more than any description has")
         description = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise TrainingError(f"{path}: cannot be read as JSON ({error})") from error
     keys = {"format", "task", "sha256", "regressor_sha256", "network", "training"}
     if not isinstance(description, dict) or description.keys() != keys:

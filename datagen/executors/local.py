@@ -1,73 +1,51 @@
-"""Worker processes on this machine: recycled, timed out, and replaced when they crash (pebble)."""
+"""Worker processes on this machine."""
 
 from __future__ import annotations
 
-import multiprocessing
-from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from dataclasses import dataclass
-from itertools import islice
-from typing import Any
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from multiprocessing.connection import wait
 
-from pebble import ProcessExpired, ProcessPool
-
-from datagen.executors.base import Job, Outcome, Outcomes, Result
+from datagen.executors.base import Job, Outcomes, Result
+from datagen.executors.supervisor import Supervisor, WorkerPolicy
+from workers.process import POLL_S
 
 
 @dataclass(frozen=True)
 class LocalExecutor:
     """Spawned processes, each taking one job at a time."""
 
-    workers: int
-    timeout_s: float = 1800.0
-    """A job that runs longer is ended and counts as crashed."""
-    attempts: int = 2
-    """How often a job that crashed its worker is tried; an exception in the job is final."""
-    jobs_per_worker: int = 40
-    """A worker is replaced after so many jobs: Blender's memory grows slowly."""
+    environments: tuple[Mapping[str, str], ...]
+    """One worker each, with these environment variables, such as the GPU it may see."""
+    policy: WorkerPolicy = field(default_factory=WorkerPolicy)
+
+    @property
+    def threads(self) -> int:
+        return max(1, len(os.sched_getaffinity(0)) // len(self.environments))
 
     def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Outcomes[Job, Result]:
         queue = iter(jobs)
-        pool = ProcessPool(
-            max_workers=self.workers,
-            max_tasks=self.jobs_per_worker,
-            context=multiprocessing.get_context("spawn"),
-        )
-        running: dict[Future[Result], tuple[Job, int]] = {}
-
-        def start(job: Job, attempt: int) -> None:
-            running[pool.schedule(function, args=[job], timeout=self.timeout_s)] = (job, attempt)
-
+        supervisors = [Supervisor(self.policy, environment) for environment in self.environments]
         try:
-            # A short queue ahead of the workers keeps them busy without pickling every job at once.
-            for job in islice(queue, 2 * self.workers):
-                start(job, 1)
-            while running:
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in done:
-                    job, attempt = running.pop(future)
-                    crash, outcome = _outcome(job, future)
-                    if crash and attempt < self.attempts:
-                        start(job, attempt + 1)
+            busy = [supervisor for supervisor in supervisors if _begin(supervisor, function, queue)]
+            while busy:
+                wait([waitable for supervisor in busy for waitable in supervisor.waitables], POLL_S)
+                for supervisor in list(busy):
+                    if (outcome := supervisor.poll()) is None:
                         continue
-                    for following in islice(queue, 1):
-                        start(following, 1)
+                    if not _begin(supervisor, function, queue):
+                        busy.remove(supervisor)
                     yield outcome
-            pool.close()
         finally:
-            pool.stop()
-            pool.join()
+            for supervisor in supervisors:
+                supervisor.stop()
 
 
-def _outcome(job: Job, future: Future[Any]) -> tuple[bool, Outcome[Job, Any]]:
-    """Whether the worker (rather than the job) failed, and the outcome if this was the last attempt."""
-    try:
-        return False, Outcome(job, future.result())
-    except ProcessExpired as error:
-        return True, Outcome(job, None, f"the worker process died with exit code {error.exitcode}")
-    except TimeoutError:
-        return True, Outcome(job, None, "the job ran into its time limit")
-    except CancelledError:
-        return False, Outcome(job, None, "the job was cancelled")
-    except Exception as error:  # whatever the job raised is its outcome
-        return False, Outcome(job, None, f"{type(error).__name__}: {error}")
+def _begin(supervisor: Supervisor, function: Callable[[Job], Result], queue: Iterator[Job]) -> bool:
+    """Give the supervisor the next job of the queue, if there is one, else end its process."""
+    for job in queue:
+        supervisor.start(function, job)
+        return True
+    supervisor.stop()
+    return False

@@ -5,6 +5,7 @@ from typing import Protocol
 
 from stereoforge.commands.demo import Demo
 from stereoforge.commands.evaluate import Evaluate
+from stereoforge.commands.export import Export
 from stereoforge.commands.export_model import ExportModel
 from stereoforge.commands.refine import Refine
 from stereoforge.commands.render import Render
@@ -26,6 +27,7 @@ COMMANDS: dict[str, Callable[..., Command]] = {
     "render": Render,
     "verify": Verify,
     "view": View,
+    "export": Export,
     "train": Train,
     "export-model": ExportModel,
     "tune": Tune,

@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from rich.markup import escape
+from rich.table import Table
+
 from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dataset
 from datagen.assets import import_assets
 from datagen.estimate import estimate_run
+from datagen.executors import Executor
 from datagen.layout import EXTRA_TARGETS, Layout
 from datagen.manifest import SceneManifest
+from datagen.quarantine import QuarantinedScene, quarantined_scenes
+from datagen.render import SCENE_TIMEOUT_S, local_executor, ray_executor
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console, progress_bar
 from stereoforge.values import parse_shard, parse_size, shown, shown_duration
+from storage import open_tree
 
 DEFAULT_FAMILY = "flying_things"
 DEFAULT_SCENES = 20
@@ -26,11 +36,12 @@ DEFAULT_SCENES = 20
 class Render:
     """Render a stereo data set with exact ground truth; run it again to finish or extend it.
 
-    With --recipe, the file says what to render and the flags given besides it change it.
+    With --recipe, the file says what to render and the flags given besides it change it. A scene that crashes,
+    hangs or exceeds its memory twice goes to DIR/quarantine and the others go on.
     """
 
-    out: Annotated[Path, shown("DIR")]
-    """Folder of the data set."""
+    out: Annotated[str, shown("DIR")]
+    """Folder of the data set, or a URL such as s3://bucket/folder."""
     family: Annotated[str | None, shown("NAME", DEFAULT_FAMILY)] = None
     """What kind of world."""
     scenes: Annotated[int | None, shown("N", DEFAULT_SCENES)] = None
@@ -54,8 +65,16 @@ class Render:
     """What Cycles computes on."""
     workers: Annotated[int | None, shown("N", "one a core")] = None
     """Worker processes."""
-    executor: Literal["local"] = "local"
-    """Where the workers run."""
+    only_failed: bool = False
+    """Try again the scenes in quarantine, and nothing else."""
+    scene_timeout: Annotated[float, shown("S")] = SCENE_TIMEOUT_S
+    """Seconds after which a scene's worker is ended."""
+    worker_memory: Annotated[float | None, shown("GB", "this machine's memory, shared by the workers")] = None
+    """Memory in GB beyond which a scene's worker is ended."""
+    executor: Literal["local", "ray"] = "local"
+    """Where the workers run: on this machine, or on those of a Ray cluster."""
+    ray_address: Annotated[str | None, shown("ADDR", "a cluster of this machine alone")] = None
+    """The Ray cluster to use, such as auto or ray://host:10001."""
     shard: Annotated[str, shown("I/N")] = "0/1"
     """Render only scenes I, I + N, I + 2N, ..., so that N machines can share a folder."""
     recipe: Annotated[Path | None, shown("FILE", "none")] = None
@@ -72,26 +91,30 @@ class Render:
 
     def run(self) -> None:
         recipe = self._recipe()
-        if self.workers is not None and self.workers < 1:
-            raise UsageError(f"--workers must be at least 1, got {self.workers}")
+        executor = self._executor()
         if self.meshes or self.textures or self.environments:
             recipe = self._with_assets(recipe)
         if self.dry_run:
             self._estimate(recipe)
             return
-        summary = self._render(recipe)
+        with _terminated_like_interrupted():
+            summary = self._render(recipe, executor)
         console.print(
             f"{self.out}: {summary.rendered} scenes rendered, {summary.already_there} were there already"
         )
         if summary.failures:
-            for scene, reason in summary.failures:
-                console.print(f"  {scene}: {reason}", markup=False)
-            raise CommandError(f"{len(summary.failures)} scenes of {self.out} could not be rendered")
+            console.print(_failure_table(summary.failures))
+            raise CommandError(
+                f"{len(summary.failures)} scenes could not be rendered; {self.out}/quarantine has their records and "
+                "logs, and --only-failed tries them again"
+            )
 
     def _with_assets(self, recipe: Recipe) -> Recipe:
         """Prepare the user's own files into the data set's folder and add them to the recipe."""
         if self.dry_run:
             raise UsageError("--dry-run reads no --meshes, --textures or --environments: leave them out")
+        if "://" in self.out:
+            raise UsageError("--meshes, --textures and --environments need a folder for --out, not a URL")
         with tempfile.TemporaryDirectory(prefix="stereoforge-assets-") as prepared:
             imported = import_assets(
                 Path(prepared), meshes=self.meshes, textures=self.textures, environments=self.environments
@@ -103,7 +126,7 @@ class Render:
             except DatasetError as error:
                 raise UsageError(str(error)) from error
             render_dataset(replace(recipe, scenes={}), self.out)  # Claims the folder, or refuses it.
-            shutil.copytree(prepared, Layout(self.out).assets, dirs_exist_ok=True)
+            shutil.copytree(prepared, Layout(Path(self.out)).assets, dirs_exist_ok=True)
         return recipe
 
     def _estimate(self, recipe: Recipe) -> None:
@@ -129,7 +152,21 @@ class Render:
                 f"  about {found.bytes / 1e6:,.0f} MB of disk, {found.scene_bytes / 1e6:.1f} MB a scene"
             )
 
-    def _render(self, recipe: Recipe) -> RenderSummary:
+    def _executor(self) -> Executor:
+        if self.workers is not None and self.workers < 1:
+            raise UsageError(f"--workers must be at least 1, got {self.workers}")
+        if not self.scene_timeout > 0:
+            raise UsageError(f"--scene-timeout must be positive, got {self.scene_timeout:g}")
+        if self.worker_memory is not None and not self.worker_memory > 0:
+            raise UsageError(f"--worker-memory must be positive, got {self.worker_memory:g}")
+        memory_bytes = None if self.worker_memory is None else int(self.worker_memory * 1e9)
+        if self.executor == "ray":
+            return ray_executor(self.ray_address, self.workers, self.device, self.scene_timeout, memory_bytes)
+        if self.ray_address is not None:
+            raise UsageError("--ray-address goes with --executor ray")
+        return local_executor(self.workers, self.device, self.scene_timeout, memory_bytes)
+
+    def _render(self, recipe: Recipe, executor: Executor) -> RenderSummary:
         with progress_bar() as progress:
             task = progress.add_task(f"rendering {recipe.family}", total=None)
 
@@ -139,9 +176,10 @@ class Render:
             return render_dataset(
                 recipe,
                 self.out,
-                workers=self.workers,
                 device=self.device,
                 shard=parse_shard(self.shard),
+                executor=executor,
+                only=quarantined_scenes(open_tree(self.out)) if self.only_failed else None,
                 on_scene=on_scene,
             )
 
@@ -174,3 +212,22 @@ class Render:
         if family not in FAMILIES:
             raise UsageError(f"there is no --family {family}; there are {', '.join(FAMILIES)}")
         return Recipe(FAMILIES[family].config(), {"train": DEFAULT_SCENES})
+
+
+def _failure_table(failures: tuple[QuarantinedScene, ...]) -> Table:
+    table = Table(title="in quarantine", title_justify="left")
+    for heading in ("scene", "what happened", "attempts"):
+        table.add_column(heading, overflow="fold")
+    for entry in failures:
+        table.add_row(entry.name, escape(entry.reason), str(entry.attempts))
+    return table
+
+
+@contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    """Let SIGTERM, a scheduler's way to say stop, end the run as cleanly as Ctrl-C."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

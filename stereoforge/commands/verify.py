@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from datagen.verify import verify_dataset
-from stereoforge.errors import CommandError
+from datagen.manifest import SceneManifest
+from datagen.repair import broken_scenes, repair_dataset
+from datagen.verify import VerifyReport, verify_dataset
+from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console, progress_bar
 from stereoforge.values import shown
 
@@ -20,19 +24,57 @@ PROBLEMS_SHOWN = 50
 class Verify:
     """Check every file against its manifest and every disparity against its scene; exit 1 if anything is off."""
 
-    data: Annotated[tyro.conf.Positional[Path], shown("DIR")]
-    """Folder of the data set."""
+    data: Annotated[tyro.conf.Positional[str], shown("DIR")]
+    """Folder of the data set, or its URL."""
+    repair: bool = False
+    """Render the broken scenes again, exactly those, and check them again."""
+    workers: Annotated[int | None, shown("N", "one a core")] = None
+    """Worker processes."""
 
     def run(self) -> None:
-        with progress_bar() as progress:
-            task = progress.add_task("verifying", total=None)
-            report = verify_dataset(
-                self.data, lambda done, total: progress.update(task, completed=done, total=total)
-            )
-        for problem in report.problems[:PROBLEMS_SHOWN]:
-            console.print(f"  {problem}", markup=False)
-        if len(report.problems) > PROBLEMS_SHOWN:
-            console.print(f"  and {len(report.problems) - PROBLEMS_SHOWN} more")
+        if self.workers is not None and self.workers < 1:
+            raise UsageError(f"--workers must be at least 1, got {self.workers}")
+        report = self._verify()
+        _print_problems(report)
+        broken = broken_scenes(report.problems)
+        if self.repair and broken:
+            console.print(f"{report}; rendering {len(broken)} scenes again")
+            self._repair(broken)
+            elsewhere = sum(problem.scene is None for problem in report.problems)
+            report = self._verify(broken)
+            _print_problems(report)
+            if elsewhere:
+                raise CommandError(f"{report}; {elsewhere} problems are in no finished scene and are left")
         if not report.ok:
             raise CommandError(str(report))
         console.print(str(report))
+
+    def _verify(self, only: Collection[tuple[str, int]] | None = None) -> VerifyReport:
+        cores = len(os.sched_getaffinity(0))
+        with _progress("verifying") as on_progress:
+            return verify_dataset(self.data, on_progress, workers=self.workers or cores, only=only)
+
+    def _repair(self, broken: list[tuple[str, int]]) -> None:
+        with _progress("rendering") as on_progress:
+
+            def on_scene(done: int, total: int, _: SceneManifest | None) -> None:
+                on_progress(done, total)
+
+            summary = repair_dataset(self.data, broken, on_scene=on_scene)
+        if summary.failures:
+            names = ", ".join(entry.name for entry in summary.failures)
+            raise CommandError(f"{self.data}: {names} could not be rendered again, see quarantine")
+
+
+@contextmanager
+def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    with progress_bar() as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)
+
+
+def _print_problems(report: VerifyReport) -> None:
+    for problem in report.problems[:PROBLEMS_SHOWN]:
+        console.print(f"  {problem}", markup=False)
+    if len(report.problems) > PROBLEMS_SHOWN:
+        console.print(f"  and {len(report.problems) - PROBLEMS_SHOWN} more")

@@ -10,6 +10,7 @@ import pytest
 from datagen import Recipe, render_dataset
 from scenes import FAMILIES
 from tests.datagen.analytic_world import write_dataset
+from tests.datagen.sabotage import ONE_WORKER, RECIPE
 
 
 @pytest.fixture(scope="session")
@@ -33,4 +34,12 @@ def rendered_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     world = FAMILIES["flying_things"].config(width=160, height=90)
     summary = render_dataset(Recipe(world, {"train": 1, "test": 1}, seed=1, samples=1), root, workers=1)
     assert summary.failures == ()
+    return root
+
+
+@pytest.fixture(scope="session")
+def small_reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `sabotage.RECIPE` gives when nothing goes wrong; not to be changed."""
+    root = tmp_path_factory.mktemp("small") / "set"
+    assert render_dataset(RECIPE, root, executor=ONE_WORKER).failures == ()
     return root

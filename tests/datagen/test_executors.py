@@ -1,7 +1,8 @@
-"""Local workers: results, exceptions, crashes and hangs each cost what they should."""
+"""Executors: results, exceptions, crashes and hangs each cost what they should; nothing is left running."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import time
@@ -9,18 +10,28 @@ from pathlib import Path
 
 import pytest
 
-from datagen.executors import LocalExecutor
+from datagen.executors import LocalExecutor, WorkerPolicy
+from datagen.executors.devices import assign_devices, find_gpus
+from workers import Limits
 
 
 def misbehave(job: tuple[str, Path]) -> str:
     kind, folder = job
+    print(f"this is {kind}", flush=True)
     if kind == "raise":
         raise ValueError("a sentence")
+    if kind == "no space":
+        raise OSError(28, "No space left on device", "a.png")
     if kind == "crash":
-        os.kill(os.getpid(), signal.SIGSEGV)
+        ctypes.string_at(0)
     if kind == "crash once" and not (folder / "crashed").exists():
         (folder / "crashed").touch()
-        os.kill(os.getpid(), signal.SIGKILL)
+        ctypes.string_at(0)
+    if kind == "be killed often":
+        with (folder / "kills").open("a") as kills:
+            kills.write("x")
+        if len((folder / "kills").read_text()) < 4:
+            os.kill(os.getpid(), signal.SIGKILL)
     if kind == "hang":
         time.sleep(600)
     return f"{kind} done"
@@ -28,25 +39,37 @@ def misbehave(job: tuple[str, Path]) -> str:
 
 @pytest.mark.slow
 def test_every_kind_of_end_is_an_outcome(tmp_path: Path) -> None:
-    kinds = ["fine", "raise", "crash", "crash once", "hang", "fine too"]
-    executor = LocalExecutor(workers=2, timeout_s=3.0)
+    kinds = ["fine", "raise", "no space", "crash", "crash once", "be killed often", "hang", "fine too"]
+    executor = LocalExecutor(({},) * 2, WorkerPolicy(Limits(timeout_s=1.0)))
     outcomes = {o.job[0]: o for o in executor.run(misbehave, [(kind, tmp_path) for kind in kinds])}
     assert set(outcomes) == set(kinds)
-    assert [outcomes[kind].result for kind in ("fine", "crash once", "fine too")] == [
-        "fine done",
-        "crash once done",
-        "fine too done",
+    good = ("fine", "crash once", "be killed often", "fine too")
+    assert [(outcomes[kind].result, outcomes[kind].attempts) for kind in good] == [
+        ("fine done", 1),
+        ("crash once done", 2),
+        ("be killed often done", 4),
+        ("fine too done", 1),
     ]
-    assert outcomes["raise"].error == "ValueError: a sentence"
-    assert "died" in (outcomes["crash"].error or "")
-    assert "time limit" in (outcomes["hang"].error or "")
-    assert [outcomes[kind].result for kind in ("raise", "crash", "hang")] == [None, None, None]
+    ends = {kind: outcomes[kind].failure for kind in kinds if kind not in good}
+    described = {kind: (end.kind, end.sentence) for kind, end in ends.items() if end}
+    assert described == {
+        "raise": ("exception", "ValueError: a sentence"),
+        "no space": ("disk_full", "OSError: [Errno 28] No space left on device: 'a.png'"),
+        "crash": ("crash", "its process crashed (SIGSEGV)"),
+        "hang": ("timeout", "ran longer than its limit of 1 s"),
+    }
+    assert [outcomes[kind].attempts for kind in described] == [1, 1, 2, 2]
+    assert all(end is not None and f"this is {kind}" in end.output for kind, end in ends.items())
+
+
+def report_pid(seconds: int) -> int:
+    time.sleep(seconds if seconds > 1 else 0)
+    return os.getpid()
 
 
 @pytest.mark.slow
 def test_closing_early_ends_the_workers() -> None:
-    executor = LocalExecutor(workers=2)
-    outcomes = executor.run(report_pid, [0, 1, 600, 600])
+    outcomes = LocalExecutor(({},) * 2).run(report_pid, [0, 1, 600, 600])
     pids = [next(outcomes).result, next(outcomes).result]
     start = time.monotonic()
     outcomes.close()
@@ -57,6 +80,46 @@ def test_closing_early_ends_the_workers() -> None:
             os.kill(pid, 0)
 
 
-def report_pid(seconds: int) -> int:
-    time.sleep(seconds if seconds > 1 else 0)
+def grow(megabytes: int) -> int:
+    HELD.append(b"x" * (megabytes << 20))
     return os.getpid()
+
+
+HELD: list[bytes] = []
+
+
+@pytest.mark.slow
+def test_workers_are_recycled_by_jobs_and_by_memory() -> None:
+    by_jobs = LocalExecutor(({},), WorkerPolicy(jobs_per_worker=2))
+    pids = [outcome.result for outcome in by_jobs.run(report_pid, [0] * 4)]
+    assert pids[0] == pids[1] != pids[2] == pids[3]
+    by_memory = LocalExecutor(({},), WorkerPolicy(recycle_bytes=400 << 20))
+    pids = [outcome.result for outcome in by_memory.run(grow, [1, 500, 1])]
+    assert pids[0] == pids[1] != pids[2]
+
+
+def gpu_seen(_: int) -> str | None:
+    time.sleep(0.5)
+    return os.environ.get("CUDA_VISIBLE_DEVICES")
+
+
+@pytest.mark.slow
+def test_each_worker_has_its_environment() -> None:
+    environments = tuple({"CUDA_VISIBLE_DEVICES": str(index)} for index in range(2))
+    executor = LocalExecutor(environments)
+    assert {outcome.result for outcome in executor.run(gpu_seen, range(4))} == {"0", "1"}
+
+
+def test_one_worker_a_gpu_and_each_its_own() -> None:
+    assert assign_devices("cpu", [], 3) == ({}, {}, {})
+    two = ({"CUDA_VISIBLE_DEVICES": "0"}, {"CUDA_VISIBLE_DEVICES": "GPU-ab"})
+    assert assign_devices("optix", ["0", "GPU-ab"]) == two
+    assert assign_devices("cuda", ["0", "GPU-ab"], 3) == (*two, two[0])
+    assert assign_devices("hip", ["0", "1"], 1) == ({"HIP_VISIBLE_DEVICES": "0"},)
+    assert assign_devices("metal", [], None) == ({},)
+
+
+def test_gpus_that_the_environment_names_are_those_to_use() -> None:
+    assert find_gpus("cuda", {"CUDA_VISIBLE_DEVICES": "2, 5"}) == ["2", "5"]
+    assert find_gpus("hip", {"HIP_VISIBLE_DEVICES": ""}) == []
+    assert find_gpus("cpu", {"CUDA_VISIBLE_DEVICES": "2"}) == []

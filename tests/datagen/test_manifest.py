@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from datagen.errors import DatasetError
-from datagen.manifest import FileEntry, SceneManifest, file_entry, read_manifest, write_manifest
+from datagen.manifest import FileEntry, SceneManifest, file_entry, read_manifest, seal, write_manifest
 
 DIGEST = "0123456789abcdef" * 4
 EXAMPLE = SceneManifest(
@@ -109,10 +109,22 @@ def test_damage_is_one_sentence_naming_the_file(tmp_path: Path, name: str) -> No
 
 
 def test_the_undamaged_form_of_those_is_read(tmp_path: Path) -> None:
-    (tmp_path / "m.json").write_bytes(damaged(scene=4))
+    (tmp_path / "m.json").write_text(seal(json.loads(damaged(scene=4))))
     assert read_manifest(tmp_path / "m.json") == replace(EXAMPLE, scene=4)
 
 
 def test_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"m\.json: cannot be read: No such file"):
         read_manifest(tmp_path / "m.json")
+
+
+def test_every_flipped_bit_is_found(tmp_path: Path) -> None:
+    path = tmp_path / "m.json"
+    write_manifest(path, EXAMPLE)
+    good = path.read_bytes()
+    for position in range(len(good)):
+        flipped = bytearray(good)
+        flipped[position] ^= 1 << position % 8
+        path.write_bytes(flipped)
+        with pytest.raises(DatasetError, match=r"m\.json: "):
+            read_manifest(path)

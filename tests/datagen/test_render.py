@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import shutil
 import signal
@@ -18,23 +16,10 @@ import pytest
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.layout import Layout
 from scenes import FAMILIES
+from tests.datagen.sabotage import hashes
 
 CONFIG = FAMILIES["flying_things"].config
 RECIPE = Recipe(CONFIG(width=96, height=54, frames=2), {"train": 3, "test": 2}, seed=5, samples=2)
-
-
-def hashes(root: Path) -> dict[str, str]:
-    """SHA-256 of every file; of manifests only what they say of the files, since timings differ."""
-    found = {}
-    for path in sorted(path for path in root.rglob("*") if path.is_file()):
-        name = path.relative_to(root).as_posix()
-        data = path.read_bytes()
-        if name.startswith("manifest/"):
-            manifest = json.loads(data)
-            del manifest["seconds"]
-            data = json.dumps(manifest).encode()
-        found[name] = hashlib.sha256(data).hexdigest()
-    return found
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,326 @@
+"""What a run survives, measured. Each experiment prints its figures and fails if they are not what they must be.
+
+    python -m benchmarks.faults kills      [--scenes 300] [--seconds-between-kills 4]
+    python -m benchmarks.faults restarts   [--scenes 40] [--kills 20]
+    python -m benchmarks.faults disk       [--scenes 12]            (as root: it mounts a small file system)
+    python -m benchmarks.faults corrupt    [--trials 1000]
+    python -m benchmarks.faults flips      [--scenes 12] [--flips 200]
+    python -m benchmarks.faults memory     [--scenes 500]
+    python -m benchmarks.faults throughput [--scenes 60]
+
+From the root of a checkout. Scenes are the smallest there are: 64 x 32 pixels, one sample, two or three objects.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import shutil
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from multiprocessing.connection import wait
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.corruption import READERS, damage, make_examples
+from datagen import Recipe, render_dataset
+from datagen.errors import DatasetError, DiskFullError
+from datagen.executors import LocalExecutor, RayExecutor, WorkerPolicy
+from datagen.recipe import write_recipe
+from datagen.verify import verify_dataset
+from scenes import FAMILIES
+from tests.datagen.sabotage import Sabotage, hashes, without
+from workers import Limits, WorkerError, WorkerProcess
+
+WORLD = FAMILIES["flying_things"].config(
+    width=64, height=32, flying_objects=(1, 1), background_objects=(1, 1), background_materials=(1, 1)
+)
+LIMITS = Limits(timeout_s=60.0, memory_bytes=1500 << 20)
+
+
+def tiny(scenes: int) -> Recipe:
+    return Recipe(WORLD, {"train": scenes}, seed=11, samples=1)
+
+
+def local(workers: int = 2, policy: WorkerPolicy | None = None) -> LocalExecutor:
+    return LocalExecutor(({},) * workers, policy or WorkerPolicy(LIMITS))
+
+
+def check(what: str, holds: bool) -> None:
+    print(f"  {'holds' if holds else 'FAILS'}: {what}", flush=True)
+    if not holds:
+        sys.exit(1)
+
+
+def kills(arguments: argparse.Namespace, folder: Path) -> None:
+    """Workers killed every few seconds, one scene that segfaults, one that hangs, one that eats memory."""
+    count, recipe = arguments.scenes, tiny(arguments.scenes)
+    render_dataset(recipe, folder / "undisturbed", executor=local())
+    bad = [count // 6, count // 2, count - 2]
+    names = [f"train/{number:04d}" for number in bad]
+    faults = dict(zip(names, ("segfault", "hang", "eat memory"), strict=True))
+    with killing_workers(arguments.seconds_between_kills) as killed:
+        summary = render_dataset(recipe, folder / "disturbed", executor=Sabotage(local(), faults))
+    print(f"  {len(killed)} workers killed; {summary.rendered} scenes committed")
+    for entry in summary.failures:
+        print(f"  in quarantine: {entry.name} ({entry.kind}, {entry.attempts} attempts): {entry.reason}")
+    check("all scenes but three committed", summary.rendered == count - 3)
+    check("those three in quarantine", [entry.name for entry in summary.failures] == names)
+    expected = without(hashes(folder / "undisturbed"), *(f"{number:04d}" for number in bad))
+    check("the same SHA-256 as undisturbed", hashes(folder / "disturbed") == expected)
+
+
+@contextmanager
+def killing_workers(period_s: float) -> Iterator[list[int]]:
+    killed: list[int] = []
+    over = threading.Event()
+
+    def kill() -> None:
+        while not over.wait(random.uniform(0.5, 1.5) * period_s):
+            workers = [pid for pid in children_of(os.getpid()) if is_worker(pid)]
+            if workers:
+                victim = random.choice(workers)
+                os.kill(victim, signal.SIGKILL)
+                killed.append(victim)
+
+    thread = threading.Thread(target=kill)
+    thread.start()
+    try:
+        yield killed
+    finally:
+        over.set()
+        thread.join()
+
+
+def children_of(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def is_worker(pid: int) -> bool:
+    try:
+        return b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return False
+
+
+def resident_mib(pid: int) -> float:
+    try:
+        return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * 4096 / 2**20
+    except OSError:
+        return 0.0
+
+
+def restarts(arguments: argparse.Namespace, folder: Path) -> None:
+    """The whole command killed with -9 at random moments, and started again."""
+    recipe, root = tiny(arguments.scenes), folder / "set"
+    render_dataset(recipe, folder / "undisturbed", executor=local())
+    write_recipe(folder / "recipe.yaml", recipe)
+    words = ["render", "--recipe", str(folder / "recipe.yaml"), "--out", str(root), "--workers", "2"]
+    command = [sys.executable, "-m", "stereoforge", *words]
+    done = []
+    for _ in range(arguments.kills):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(random.uniform(0.0, arguments.longest_run))
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        done.append(len(list(root.glob("manifest/TRAIN/A/*.json"))))
+    print(f"  scenes committed at each kill: {done}")
+    check("the last run succeeds", subprocess.run(command, check=False, capture_output=True).returncode == 0)
+    check("the same SHA-256 as undisturbed", hashes(root) == hashes(folder / "undisturbed"))
+    leftovers = [path for path in root.iterdir() if path.name.startswith(".")]
+    check("no leftovers", not leftovers and verify_dataset(root, workers=1).ok)
+
+
+def disk(arguments: argparse.Namespace, folder: Path) -> None:
+    """A file system that fills up mid-run and gets more room."""
+    recipe = tiny(arguments.scenes)
+    render_dataset(recipe, folder / "undisturbed", executor=local(1))
+    size = sum(path.stat().st_size for path in (folder / "undisturbed").rglob("*") if path.is_file())
+    mounted = folder / "disk"
+    mounted.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size // 2}", "tmpfs", mounted], check=True)
+    try:
+        try:
+            render_dataset(recipe, mounted / "set", executor=local(1))
+            check("the disk fills up", False)
+        except DiskFullError as error:
+            print(f"  {error}")
+        there = hashes(mounted / "set")
+        check("nothing but whole scenes is left", there.items() <= hashes(folder / "undisturbed").items())
+        subprocess.run(["mount", "-o", f"remount,size={64 << 20}", mounted], check=True)
+        render_dataset(recipe, mounted / "set", executor=local(1))
+        check("the rerun completes it", hashes(mounted / "set") == hashes(folder / "undisturbed"))
+    finally:
+        subprocess.run(["umount", mounted], check=True)
+
+
+def corrupt(arguments: argparse.Namespace, folder: Path) -> None:
+    """Damaged files through every reader, in a process with 5 seconds and 1 GiB beyond what it starts with."""
+    for name, example in make_examples(folder).items():
+        read, good = READERS[name], example.read_bytes()
+        rng = np.random.default_rng(0)
+        ends: Counter[str] = Counter()
+        worker = reader_process(read, example)
+        for _ in range(arguments.trials):
+            example.write_bytes(damage(good, rng))
+            end = outcome_of(worker, read, example)
+            ends[end] += 1
+            if not worker.alive:
+                worker.stop()
+                example.write_bytes(good)
+                worker = reader_process(read, example)
+        worker.stop()
+        print(f"  {name:12} {dict(sorted(ends.items()))}", flush=True)
+        check(f"{name}: read or refused in a sentence", set(ends) <= {"read", "refused"})
+
+
+def reader_process(read: Callable[[Path], object], example: Path) -> WorkerProcess:
+    """A worker that has read the intact file, limited to 1 GiB more than that took."""
+    first = WorkerProcess()
+    run(first, read, example)
+    base = first.resident_bytes()
+    first.stop()
+    worker = WorkerProcess(Limits(timeout_s=5.0, memory_bytes=base + (1 << 30)))
+    run(worker, read, example)
+    return worker
+
+
+def run(worker: WorkerProcess, read: Callable[[Path], object], path: Path) -> None:
+    worker.start(read, path)
+    while not worker.poll():
+        wait(worker.waitables, 0.05)
+    worker.result()
+
+
+def outcome_of(worker: WorkerProcess, read: Callable[[Path], object], path: Path) -> str:
+    try:
+        run(worker, read, path)
+    except WorkerError as error:
+        return error.kind
+    except ValueError as error:
+        return "refused" if "\n" not in str(error) else "refused in many lines"
+    except Exception as error:
+        return f"raised {type(error).__name__}"
+    return "read"
+
+
+def flips(arguments: argparse.Namespace, folder: Path) -> None:
+    """Single flipped bits anywhere in a data set, one at a time, each to be found by verify."""
+    root = folder / "set"
+    render_dataset(tiny(arguments.scenes), root, executor=local())
+    shutil.rmtree(root / "logs")
+    files = sorted(path for path in root.rglob("*") if path.is_file())
+    sizes = np.array([path.stat().st_size for path in files])
+    rng = np.random.default_rng(1)
+    missed = []
+    for _ in range(arguments.flips):
+        path = files[rng.choice(len(files), p=sizes / sizes.sum())]
+        good = path.read_bytes()
+        bad = bytearray(good)
+        position, bit = int(rng.integers(len(good))), int(rng.integers(8))
+        bad[position] ^= 1 << bit
+        path.write_bytes(bad)
+        try:
+            named = any(item.place == path.relative_to(root).as_posix() for item in problems_of(root))
+        except DatasetError as error:
+            named = path.name in str(error)
+        if not named:
+            missed.append((path, position, bit))
+        path.write_bytes(good)
+    report = verify_dataset(root, workers=2)
+    print(f"  {report}")
+    check(f"all {arguments.flips} flips found, and the file named", not missed)
+    check("nothing found without one", report.ok)
+
+
+def problems_of(root: Path) -> tuple:  # type: ignore[type-arg]
+    return verify_dataset(root, workers=None, sampled_pixels=0).problems
+
+
+def memory(arguments: argparse.Namespace, folder: Path) -> None:
+    """Resident memory over a long run of workers that are never recycled."""
+    never = WorkerPolicy(LIMITS, jobs_per_worker=10**9, recycle_bytes=10**12)
+    samples: list[tuple[float, float]] = []
+
+    def on_scene(done: int, total: int, _: object) -> None:
+        workers = [resident_mib(pid) for pid in children_of(os.getpid()) if is_worker(pid)]
+        samples.append((resident_mib(os.getpid()), max(workers, default=0.0)))
+        if done % 50 == 0:
+            print(
+                f"  {done}/{total}: parent {samples[-1][0]:.0f} MiB, worker {samples[-1][1]:.0f} MiB",
+                flush=True,
+            )
+
+    render_dataset(tiny(arguments.scenes), folder / "set", executor=local(1, never), on_scene=on_scene)
+    fifth = len(samples) // 5
+    for index, who in enumerate(("parent", "worker")):
+        second = statistics.median(sample[index] for sample in samples[fifth : 2 * fifth])
+        last = statistics.median(sample[index] for sample in samples[-fifth:])
+        print(f"  {who}: {second:.0f} MiB in the second fifth of the run, {last:.0f} MiB in the last")
+        check(f"{who} grows by less than 5 %", last < 1.05 * second)
+
+
+def throughput(arguments: argparse.Namespace, folder: Path) -> None:
+    """Ray against local, the same workers, in turn and twice, starting up included."""
+    recipe, seconds = tiny(arguments.scenes), {"local": [], "ray": []}  # type: ignore[var-annotated]
+    for turn in range(2):
+        for name, executor in (
+            ("local", local()),
+            ("ray", RayExecutor(workers=2, policy=WorkerPolicy(LIMITS))),
+        ):
+            times: list[float] = []
+            render_dataset(
+                recipe,
+                folder / f"{name}{turn}",
+                executor=executor,
+                on_scene=lambda *_, times=times: times.append(time.monotonic()),
+            )
+            # From the first scene on: how long a cluster takes to start is another matter.
+            seconds[name].append((times[-1] - times[0]) / (len(times) - 1))
+    rates = {name: 1 / min(values) for name, values in seconds.items()}
+    print(f"  scenes a second: {json.dumps({name: round(rate, 2) for name, rate in rates.items()})}")
+    check(f"ray / local = {rates['ray'] / rates['local']:.2f} >= 0.9", rates["ray"] >= 0.9 * rates["local"])
+
+
+EXPERIMENTS = {
+    function.__name__: function for function in (kills, restarts, disk, corrupt, flips, memory, throughput)
+}
+SCENES = {"kills": 300, "restarts": 40, "disk": 12, "flips": 12, "memory": 500, "throughput": 60}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("experiment", choices=EXPERIMENTS)
+    parser.add_argument("--scenes", type=int)
+    parser.add_argument("--seconds-between-kills", type=float, default=4.0)
+    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--longest-run", type=float, default=30.0, help="seconds before a kill, at most")
+    parser.add_argument("--trials", type=int, default=1000)
+    parser.add_argument("--flips", type=int, default=200)
+    arguments = parser.parse_args()
+    if arguments.scenes is None:
+        arguments.scenes = SCENES.get(arguments.experiment, 0)
+    started, cpu = time.monotonic(), os.times()
+    print(f"{arguments.experiment}: {vars(arguments)}", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        EXPERIMENTS[arguments.experiment](arguments, Path(folder))
+    used = os.times()
+    spent = sum(used[:4]) - sum(cpu[:4])
+    print(f"  {time.monotonic() - started:.0f} s, {spent:.0f} s of CPU")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+"""Which graphics processor each worker may see: one worker a GPU, and each GPU its own."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+VISIBLE = {
+    "cuda": "CUDA_VISIBLE_DEVICES",
+    "optix": "CUDA_VISIBLE_DEVICES",
+    "hip": "HIP_VISIBLE_DEVICES",
+}
+"""The variable that tells a process which GPUs there are, by Cycles' name for the device."""
+_KFD_NODES = Path("/sys/class/kfd/kfd/topology/nodes")
+
+
+def assign_devices(
+    device: str, gpus: Sequence[str], workers: int | None = None
+) -> tuple[Mapping[str, str], ...]:
+    """Environment variables of each worker, one worker a GPU unless told how many; they take turns then.
+
+    gpus: the names of the GPUs as the variable in `VISIBLE` takes them, such as "0" or a UUID. Devices that
+    cannot be told apart by a variable (the CPU, Apple's) and machines that name none give empty mappings.
+    """
+    if device not in VISIBLE or not gpus:
+        return ({},) * (workers or 1)
+    count = len(gpus) if workers is None else workers
+    return tuple({VISIBLE[device]: gpus[index % len(gpus)]} for index in range(count))
+
+
+def find_gpus(device: str, environment: Mapping[str, str]) -> list[str]:
+    """The GPUs this process may use: those its own variable names, or all that the driver lists."""
+    if device not in VISIBLE:
+        return []
+    named = environment.get(VISIBLE[device])
+    if named is not None:
+        return [name.strip() for name in named.split(",") if name.strip()]
+    count = _count_amd() if device == "hip" else _count_nvidia()
+    return [str(index) for index in range(count)]
+
+
+def _count_nvidia() -> int:
+    try:
+        listing = subprocess.run(["nvidia-smi", "-L"], capture_output=True, text=True, timeout=30, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return 0
+    return sum(line.startswith("GPU ") for line in listing.stdout.splitlines())
+
+
+def _count_amd() -> int:
+    identifiers = [path.read_text().strip() for path in _KFD_NODES.glob("*/gpu_id")]
+    return sum(identifier not in ("", "0") for identifier in identifiers)

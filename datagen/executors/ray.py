@@ -1,0 +1,135 @@
+"""Workers on the machines of a Ray cluster.
+
+Ray decides where a job runs, and runs it again where a machine is lost. On the machine itself each Ray worker
+keeps one supervised process, so time limit, memory limit, retries and logs are those of the local executor.
+"""
+
+from __future__ import annotations
+
+import atexit
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import islice
+from multiprocessing.connection import wait
+from typing import Any
+
+from datagen.executors.base import Failure, Job, Outcome, Outcomes, Result
+from datagen.executors.supervisor import Supervisor, WorkerPolicy
+from workers.process import POLL_S
+
+LOST_MACHINE_RETRIES = 10
+"""How often Ray may run a job again whose machine or Ray worker is gone."""
+QUEUED_PER_SLOT = 2
+"""Jobs given to Ray for each it can run at once: enough to keep it busy, few enough to be held anywhere."""
+
+
+@dataclass(frozen=True)
+class RayExecutor:
+    """Jobs as Ray tasks; an existing cluster, or one on this machine for the time of the run."""
+
+    address: str | None = None
+    """Of a cluster, such as `auto` or `ray://host:10001`; None for a cluster of this machine alone."""
+    workers: int | None = None
+    """Most jobs at once; None for all that the cluster's resources allow."""
+    cpus_per_job: int = 1
+    gpus_per_job: float = 0.0
+    policy: WorkerPolicy = field(default_factory=WorkerPolicy)
+
+    @property
+    def threads(self) -> int:
+        return self.cpus_per_job
+
+    def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Outcomes[Job, Result]:
+        import ray
+
+        queue = iter(jobs)
+        running: dict[Any, Job] = {}
+        with _connected(self):
+            task = ray.remote(
+                num_cpus=self.cpus_per_job,
+                num_gpus=self.gpus_per_job,
+                max_calls=self.policy.jobs_per_worker,
+                max_retries=LOST_MACHINE_RETRIES,
+            )(_run_supervised)
+            try:
+                while True:
+                    room = QUEUED_PER_SLOT * self._slots() - len(running)
+                    for job in islice(queue, max(0, room)):
+                        running[task.remote(function, job, self.policy)] = job
+                    if not running:
+                        return
+                    # The timeout lets machines that join the cluster get their share.
+                    done, _ = ray.wait(list(running), num_returns=1, timeout=5.0)
+                    for reference in done:
+                        yield _outcome(running.pop(reference), reference)
+            finally:
+                for reference in running:
+                    ray.cancel(reference, force=True)
+
+    def _slots(self) -> int:
+        """How many jobs the cluster as it is now can run at once."""
+        import ray
+
+        resources = ray.cluster_resources()
+        slots = int(resources.get("CPU", 0) // self.cpus_per_job)
+        if self.gpus_per_job:
+            slots = min(slots, int(resources.get("GPU", 0) // self.gpus_per_job))
+        return max(1, slots if self.workers is None else min(slots, self.workers))
+
+
+@contextmanager
+def _connected(executor: RayExecutor) -> Iterator[None]:
+    """Use the connection of this process if it has one, else make one and end it afterwards."""
+    import ray
+
+    if ray.is_initialized():
+        yield
+        return
+    if executor.address is None:
+        cpus = None if executor.workers is None else executor.workers * executor.cpus_per_job
+        settings: dict[str, Any] = {
+            "num_cpus": cpus,
+            "include_dashboard": False,
+            "_node_ip_address": "127.0.0.1",
+        }
+    else:
+        settings = {"address": executor.address}
+    ray.init(**settings, log_to_driver=False, logging_level="ERROR", configure_logging=True)
+    try:
+        yield
+    finally:
+        ray.shutdown()
+
+
+def _outcome(job: Any, reference: Any) -> Outcome[Any, Any]:
+    """What Ray gives for a finished job, errors of Ray's own included."""
+    import ray
+
+    try:
+        result, failure, attempts = ray.get(reference)
+    except ray.exceptions.RayError as error:
+        sentence = f"its machine or Ray worker was lost: {str(error).strip().splitlines()[0]}"
+        return Outcome(job, None, Failure("killed", sentence, str(error)), LOST_MACHINE_RETRIES + 1)
+    return Outcome(job, result, failure, attempts)
+
+
+_supervisor: Supervisor | None = None
+
+
+def _run_supervised(
+    function: Callable[[Any], Any], job: Any, policy: WorkerPolicy
+) -> tuple[Any, Failure | None, int]:
+    """A Ray worker's side: run a job in this worker's supervised process and wait for its outcome."""
+    global _supervisor
+    if _supervisor is None or _supervisor.policy != policy:
+        _supervisor = Supervisor(policy)
+        atexit.register(_supervisor.stop)
+    _supervisor.start(function, job)
+    try:
+        while (outcome := _supervisor.poll()) is None:
+            wait(_supervisor.waitables, POLL_S)
+    except BaseException:  # Cancelled: the process must not go on with a job that nobody waits for.
+        _supervisor.stop()
+        raise
+    return outcome.result, outcome.failure, outcome.attempts

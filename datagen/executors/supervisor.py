@@ -1,0 +1,115 @@
+"""One worker slot: a job goes in, an outcome comes out, whatever happens to the processes meanwhile."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from typing import Any
+
+from datagen.executors.base import Failure, Outcome
+from workers import Limits, WorkerError, WorkerProcess
+
+MAX_KILLS = 10
+"""Being killed from outside is not the job's fault, but a machine without memory does that too."""
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+
+
+@dataclass(frozen=True)
+class WorkerPolicy:
+    """How worker processes are treated."""
+
+    limits: Limits = field(default_factory=Limits)
+    attempts: int = 2
+    """How often a job is tried that crashes its process or breaks its limits; an exception is final."""
+    jobs_per_worker: int = 40
+    """A process is replaced after so many jobs: Blender's memory grows slowly."""
+    recycle_bytes: int = 2 << 30
+    """A process that holds more memory than this after a job is replaced."""
+
+
+class Supervisor:
+    """Runs one job at a time in a worker process that it starts, recycles and replaces as needed.
+
+    Ask `poll` until it gives the job's outcome, waiting on `waitables` meanwhile.
+    """
+
+    def __init__(self, policy: WorkerPolicy, environment: Mapping[str, str] | None = None) -> None:
+        self.policy = policy
+        self._environment = environment
+        self._worker: WorkerProcess | None = None
+        self._jobs_done = 0
+        self._call: tuple[Callable[[Any], Any], Any] | None = None
+        self._tries = self._faults = self._kills = 0
+
+    @property
+    def busy(self) -> bool:
+        return self._call is not None
+
+    @property
+    def waitables(self) -> list[Connection | int]:
+        return self._worker.waitables if self._worker else []
+
+    def start(self, function: Callable[[Any], Any], job: Any) -> None:
+        self._call = (function, job)
+        self._tries = self._faults = self._kills = 0
+        self._try()
+
+    def poll(self) -> Outcome[Any, Any] | None:
+        """The outcome of the job, once it has one."""
+        assert self._call is not None
+        assert self._worker is not None
+        if not self._worker.poll():
+            return None
+        failure = None
+        try:
+            result = self._worker.result()
+        except WorkerError as error:
+            failure, result = Failure(error.kind, str(error), self._worker.output()), None
+        except Exception as error:  # whatever the job raised is its outcome
+            kind: Any = "disk_full" if getattr(error, "errno", None) in _NO_SPACE else "exception"
+            sentence = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            failure, result = Failure(kind, sentence, self._worker.output()), None
+        if failure and self._deserves_another_try(failure):
+            self._try()
+            return None
+        outcome = Outcome(self._call[1], result, failure, self._tries)
+        self._call = None
+        self._recycle()
+        return outcome
+
+    def stop(self) -> None:
+        """End the process, and the job with it."""
+        if self._worker:
+            self._worker.stop()
+        self._worker, self._call, self._jobs_done = None, None, 0
+
+    def _try(self) -> None:
+        assert self._call is not None
+        if self._worker is None or not self._worker.alive:
+            self._replace()
+        assert self._worker is not None
+        self._tries += 1
+        self._worker.start(*self._call)
+
+    def _deserves_another_try(self, failure: Failure) -> bool:
+        if failure.kind == "killed":
+            self._kills += 1
+            return self._kills < MAX_KILLS
+        self._faults += 1
+        return failure.kind in ("crash", "timeout", "memory") and self._faults < self.policy.attempts
+
+    def _replace(self) -> None:
+        if self._worker:
+            self._worker.stop()
+        self._worker = WorkerProcess(self.policy.limits, self._environment)
+        self._jobs_done = 0
+
+    def _recycle(self) -> None:
+        assert self._worker is not None
+        self._jobs_done += 1
+        used_up = self._jobs_done >= self.policy.jobs_per_worker
+        if used_up or self._worker.resident_bytes() > self.policy.recycle_bytes:
+            self._worker.stop()
+            self._worker = None

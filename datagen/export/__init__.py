@@ -1,0 +1,36 @@
+"""A data set in the layouts of others: one module a format with a function that writes it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from datagen.dataset import StereoDataset
+from datagen.export.kitti import export_kitti
+from datagen.export.sceneflow import export_sceneflow
+from datagen.export.shards import export_webdataset
+from storage import Tree
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """What some formats let the user choose."""
+
+    frames_per_shard: int = 256
+    """webdataset: samples in one tar file."""
+    lidar_beams: int | None = None
+    """kitti: keep only the disparities that a scanner with so many beams would measure."""
+
+
+Progress = Callable[[int, int], None]
+Exporter = Callable[[Sequence[StereoDataset], Tree, ExportOptions, Progress], None]
+"""Writes all frames of some splits of one data set into a tree, calling back with (frames done, in all)."""
+
+EXPORTERS: dict[str, Exporter] = {
+    "kitti": lambda sets, out, options, progress: export_kitti(sets, out, options.lidar_beams, progress),
+    "sceneflow": lambda sets, out, _, progress: export_sceneflow(sets, out, progress),
+    "webdataset": lambda sets, out, options, progress: export_webdataset(
+        sets, out, options.frames_per_shard, progress
+    ),
+}
+"""Every format by the name it has on the command line."""
+
+__all__ = ["EXPORTERS", "ExportOptions", "Exporter", "Progress"]

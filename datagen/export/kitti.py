@@ -1,0 +1,84 @@
+"""The layout of KITTI 2015's stereo benchmark (Menze and Geiger, CVPR 2015; its devkit's readme and io code).
+
+    training/image_2/000000_10.png       left image            training/image_3/...   right image
+    training/disp_occ_0/000000_10.png    all pixels            training/disp_noc_0/... those the other eye sees
+    training/obj_map/000000_10.png       0 background, else an object's number
+    training/calib_cam_to_cam/000000.txt projections of both cameras
+
+Disparity is 16-bit PNG, 256 times the pixels; 0 is invalid, which the sky therefore is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.dataset import StereoDataset, StereoSample
+from datagen.export.lidar import lidar_mask
+from datagen.formats import write_png
+from storage import Tree
+
+FOLDERS = {"train": "training", "val": "validation", "test": "testing"}
+"""KITTI has no validation set and keeps the ground truth of its testing set to itself; here all have it."""
+SCALE = 256.0
+OBJECT_NUMBERS = 255
+"""An object map is 8-bit: after so many the numbers begin again at 1, so that no object becomes background."""
+
+
+def export_kitti(
+    sets: Sequence[StereoDataset],
+    out: Tree,
+    lidar_beams: int | None,
+    progress: Callable[[int, int], None],
+) -> None:
+    """Write the frames of each split, numbered from 0, and `frames.txt` with the name of each."""
+    total, done = sum(map(len, sets)), 0
+    for frames in sets:
+        folder, names = FOLDERS[frames.split], []
+        for number, sample in enumerate(frames):
+            _write_frame(out, folder, number, sample, lidar_beams)
+            names.append(f"{number:06d}_10 {sample.name}\n")
+            done += 1
+            progress(done, total)
+        out.write(f"{folder}/frames.txt", "".join(names).encode())
+
+
+def encode_disparity(disparity: NDArray[np.float32], keep: NDArray[np.bool_]) -> NDArray[np.uint16]:
+    """(H, W) px to KITTI's numbers; 0 where not kept, not finite, zero (infinitely far) or too large to store."""
+    scaled = np.rint(np.nan_to_num(disparity).astype(np.float64) * SCALE)
+    storable = keep & (disparity > 0) & (scaled <= np.iinfo(np.uint16).max)
+    # Something valid must not become invalid by rounding; KITTI's own writer raises it to 1 too.
+    return np.where(storable, np.maximum(scaled, 1), 0).astype(np.uint16)
+
+
+def _write_frame(out: Tree, folder: str, number: int, sample: StereoSample, lidar_beams: int | None) -> None:
+    camera = sample.scene_record.camera
+    measured = np.ones(sample.size, bool)
+    if lidar_beams is not None:
+        measured = lidar_mask(*sample.size, camera.focal_px, lidar_beams)
+    numbers = sample.object_index_left
+    images: dict[str, NDArray[np.uint8] | NDArray[np.uint16]] = {
+        "image_2": sample.left,
+        "image_3": sample.right,
+        "disp_occ_0": encode_disparity(sample.disparity_left, measured),
+        "disp_noc_0": encode_disparity(sample.disparity_left, measured & (sample.occlusion_left == 0)),
+        "obj_map": np.where(numbers > 0, (numbers - 1) % OBJECT_NUMBERS + 1, 0).astype(np.uint8),
+    }
+    for kind, image in images.items():
+        with out.writing(f"{folder}/{kind}/{number:06d}_10.png") as path:
+            write_png(path, image)
+    text = _calibration(camera.focal_px, camera.width, camera.height, camera.baseline_m)
+    out.write(f"{folder}/calib_cam_to_cam/{number:06d}.txt", text.encode())
+
+
+def _calibration(focal_px: float, width: int, height: int, baseline_m: float) -> str:
+    """The rectified projections, with KITTI's pixel centres at whole numbers."""
+    center = ((width - 1) / 2, (height - 1) / 2)
+    lines = []
+    for camera, offset in (("02", 0.0), ("03", -focal_px * baseline_m)):
+        matrix = (focal_px, 0.0, center[0], offset, 0.0, focal_px, center[1], 0.0, 0.0, 0.0, 1.0, 0.0)
+        lines.append(f"S_rect_{camera}: {width:e} {height:e}\n")
+        lines.append(f"P_rect_{camera}: {' '.join(f'{value:.12e}' for value in matrix)}\n")
+    return "".join(lines)

@@ -1,0 +1,33 @@
+"""Which pixels a spinning laser scanner at the left eye would measure."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+ELEVATION_DEG = (-24.9, 2.0)
+"""Lowest and highest beam of the scanner KITTI used, a Velodyne HDL-64E."""
+AZIMUTH_STEP_DEG = 0.18
+"""Between two measurements of one beam at 10 turns a second."""
+
+
+def lidar_mask(height: int, width: int, focal_px: float, beams: int) -> NDArray[np.bool_]:
+    """(H, W) True in the pixels that a beam meets.
+
+    The beams are spread evenly in elevation, each measures in even steps of azimuth, and the scanner stands
+    where the camera does, upright and looking the same way. Raises ValueError for fewer than one beam.
+    """
+    if beams < 1:
+        raise ValueError(f"a laser scanner has at least one beam, got {beams}")
+    half_field = np.degrees(np.arctan2(width / 2, focal_px))
+    azimuth = np.radians(np.arange(-half_field, half_field, AZIMUTH_STEP_DEG))
+    elevation = np.radians(np.linspace(*ELEVATION_DEG, beams))
+    x = width / 2 + focal_px * np.tan(azimuth)
+    # A beam sweeps a cone, which the image plane cuts in a hyperbola.
+    y = height / 2 - focal_px * np.tan(elevation)[:, None] / np.cos(azimuth)
+    columns = np.broadcast_to(np.floor(x).astype(np.int64), y.shape)
+    rows = np.floor(y).astype(np.int64)
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    mask = np.zeros((height, width), bool)
+    mask[rows[inside], columns[inside]] = True
+    return mask

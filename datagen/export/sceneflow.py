@@ -1,0 +1,31 @@
+"""FlyingThings3D as its makers published it: the images, disparities and poses, and nothing else.
+
+The data set itself has that layout already; this is a copy of that part of it, for a tool that minds the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import groupby
+from pathlib import Path
+
+from datagen.dataset import StereoDataset
+from datagen.layout import RENDER_PASSES
+from datagen.manifest import read_manifest
+from storage import Tree
+
+KINDS = (*RENDER_PASSES.values(), "disparity", "camera_data")
+
+
+def export_sceneflow(sets: Sequence[StereoDataset], out: Tree, progress: Callable[[int, int], None]) -> None:
+    """Copy the files of each scene, their bytes unchanged."""
+    total, done = sum(map(len, sets)), 0
+    for frames in sets:
+        layout = frames.layout
+        for scene, samples in groupby(frames, lambda sample: sample.scene):
+            manifest = read_manifest(layout.local(layout.manifest(frames.split, scene)))
+            for entry in manifest.files:
+                if Path(entry.path).parts[0] in KINDS:
+                    out.write(entry.path, layout.local(layout.root / entry.path).read_bytes())
+            done += len(list(samples))
+            progress(done, total)

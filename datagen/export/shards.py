@@ -1,0 +1,78 @@
+"""Shards for streaming (docs/conventions.md): tar files as webdataset reads them, with one sample a frame.
+
+The members of a sample have the very bytes of the data set's files; the same frames give the same shards.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import tarfile
+from collections.abc import Callable, Iterator, Sequence
+
+from datagen.dataset import StereoDataset, StereoSample
+from datagen.layout import EYES, KINDS, RENDER_PASSES, TARGETS
+from datagen.sources.webdataset import INDEX_NAME
+from storage import Tree
+
+
+def export_webdataset(
+    sets: Sequence[StereoDataset],
+    out: Tree,
+    frames_per_shard: int,
+    progress: Callable[[int, int], None],
+) -> None:
+    """Write the frames of each split in order, so many to a file; each file is there whole or not at all."""
+    if frames_per_shard < 1:
+        raise ValueError(f"a shard holds at least one frame, got {frames_per_shard}")
+    total, done = sum(map(len, sets)), 0
+    index: dict[str, list[str]] = {}
+    for frames in sets:
+        for shard, first in enumerate(range(0, len(frames), frames_per_shard)):
+            name = f"{frames.split}-{shard:06d}.tar"
+            index[name] = []
+            with (
+                out.writing(name) as path,
+                tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as tar,
+            ):
+                for sample in frames[first : first + frames_per_shard]:
+                    index[name].append(_add(tar, sample))
+                    done += 1
+                    progress(done, total)
+    recipe = sets[0].layout.recipe
+    out.write(recipe.name, recipe.read_bytes())
+    out.write(INDEX_NAME, json.dumps({"shards": index}).encode())
+
+
+def _add(tar: tarfile.TarFile, sample: StereoSample) -> str:
+    """Add a sample's members; return its key."""
+    key = f"{sample.split}-{sample.scene:04d}-{sample.frame:04d}"
+    for what, data in _members(sample):
+        member = tarfile.TarInfo(f"{key}.{what}")  # Owner, rights and time are the same for all.
+        member.size = len(data)
+        tar.addfile(member, io.BytesIO(data))
+    return key
+
+
+def _members(sample: StereoSample) -> Iterator[tuple[str, bytes]]:
+    for kind in (RENDER_PASSES[sample.render_pass], *TARGETS):
+        for eye in EYES if KINDS[kind].per_eye else ():
+            path = sample.layout.file(kind, sample.split, sample.scene, eye, sample.frame)
+            what = eye if kind in RENDER_PASSES.values() else f"{kind}_{eye}"
+            yield f"{what}{path.suffix}", sample.layout.local(path).read_bytes()
+    yield "meta.json", json.dumps(_meta(sample), sort_keys=True).encode()
+
+
+def _meta(sample: StereoSample) -> dict[str, object]:
+    camera = sample.scene_record.camera
+    return {
+        "split": sample.split,
+        "scene": sample.scene,
+        "frame": sample.frame,
+        "render_pass": sample.render_pass,
+        "family": sample.scene_record.family,
+        "width": camera.width,
+        "height": camera.height,
+        "focal_px": camera.focal_px,
+        "baseline_m": camera.baseline_m,
+    }

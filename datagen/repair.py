@@ -1,0 +1,46 @@
+"""Rendering again what `verify` found broken, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from datagen.dataset import open_layout
+from datagen.executors import Executor
+from datagen.layout import SPLITS, Layout
+from datagen.manifest import SceneManifest
+from datagen.recipe import read_recipe
+from datagen.render import RenderSummary, render_dataset
+from datagen.scene_check import Problem
+from datagen.staging import discard_uncommitted
+
+
+def broken_scenes(problems: Iterable[Problem]) -> list[tuple[str, int]]:
+    """(split, scene) of every finished scene that a problem lies in, in order."""
+    found = {
+        (item.split, item.scene) for item in problems if item.split is not None and item.scene is not None
+    }
+    return sorted(found, key=lambda scene: (SPLITS.index(scene[0]), scene[1]))
+
+
+def repair_dataset(
+    root: Path | str,
+    broken: list[tuple[str, int]],
+    *,
+    executor: Executor | None = None,
+    on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
+) -> RenderSummary:
+    """Remove finished scenes and render them again; interrupted, any later render of the set does the rest.
+
+    Raises DatasetError as `render_dataset` does.
+    """
+    layout = open_layout(root)
+    recipe = read_recipe(layout.recipe)
+    for split, scene in broken:
+        layout.tree.remove(Layout(Path()).manifest(split, scene).as_posix())
+        discard_uncommitted(layout.tree, split, scene)
+    # A scene beyond the recipe's numbers has no way to be rendered again: it was never asked for.
+    splits = {split for split, _ in broken}
+    asked = replace(recipe, scenes={split: recipe.scenes.get(split, 0) for split in splits})
+    return render_dataset(asked, root, executor=executor, only=broken, on_scene=on_scene)

@@ -1,0 +1,60 @@
+"""`stereoforge export`: a data set in another layout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import tyro
+
+from datagen import StereoDataset
+from datagen.dataset import open_layout
+from datagen.export import EXPORTERS, ExportOptions
+from datagen.layout import SPLITS
+from stereoforge.errors import CommandError, UsageError
+from stereoforge.progress import console, progress_bar
+from stereoforge.values import shown
+from storage import open_tree
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write a data set in a layout that other tools read; the data set itself stays as it is."""
+
+    data: Annotated[tyro.conf.Positional[str], shown("DIR")]
+    """Folder of the data set, or its URL."""
+    format: Annotated[Literal["kitti", "sceneflow", "webdataset"], shown("kitti|sceneflow|webdataset")]
+    """kitti: 16-bit PNG disparities; sceneflow: what FlyingThings3D has and no more; webdataset: tar files."""
+    out: Annotated[str, shown("DIR2")]
+    """Folder or URL to write to."""
+    render_pass: Annotated[Literal["clean", "final"], shown("clean|final")] = "clean"
+    """Which images to take."""
+    frames_per_shard: Annotated[int, shown("N")] = 256
+    """webdataset: frames in one tar file."""
+    lidar_beams: Annotated[int | None, shown("N", "every pixel")] = None
+    """kitti: keep only the disparities that a laser scanner with so many beams would measure (KITTI's has 64)."""
+
+    def run(self) -> None:
+        if self.frames_per_shard < 1:
+            raise UsageError(f"--frames-per-shard must be at least 1, got {self.frames_per_shard}")
+        if self.lidar_beams is not None and self.lidar_beams < 1:
+            raise UsageError(f"--lidar-beams must be at least 1, got {self.lidar_beams}")
+        layout, out = open_layout(self.data), open_tree(self.out)
+        if out == layout.tree:
+            raise UsageError("--out must be another place than the data set's")
+        sets = [
+            StereoDataset(self.data, split, self.render_pass)
+            for split in SPLITS
+            if layout.committed_scenes(split)
+        ]
+        if not sets:
+            raise CommandError(f"{self.data}: has no finished scene")
+        with progress_bar() as progress:
+            task = progress.add_task("exporting", total=None)
+            EXPORTERS[self.format](
+                sets,
+                out,
+                ExportOptions(self.frames_per_shard, self.lidar_beams),
+                lambda done, total: progress.update(task, completed=done, total=total),
+            )
+        console.print(f"{self.out}: {sum(map(len, sets))} frames as {self.format}")

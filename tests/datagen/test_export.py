@@ -1,0 +1,173 @@
+"""Exports, read back by readers that are not ours."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import webdataset
+
+from datagen import StereoDataset
+from datagen.export.kitti import encode_disparity
+from datagen.export.lidar import lidar_mask
+from datagen.layout import Layout
+from datagen.source import open_source
+from stereoforge.cli import main
+
+
+def export(data: Path, kind: str, out: Path, *flags: str) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["export", str(data), "--format", kind, "--out", str(out), *flags])
+    assert end.value.code == 0
+
+
+def read_kitti(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(disparity, valid), as every KITTI loader does it."""
+    raw = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH)
+    assert raw.dtype == np.uint16
+    return raw / 256.0, raw > 0
+
+
+def test_kitti(analytic_dataset: Path, tmp_path: Path) -> None:
+    export(analytic_dataset, "kitti", tmp_path)
+    names = (tmp_path / "training/frames.txt").read_text().splitlines()
+    assert names == [f"00000{k}_10 TRAIN/A/000{k // 2}/000{6 + k % 2}" for k in range(4)]
+    for number, sample in enumerate(StereoDataset(analytic_dataset, "train")):
+        file = f"{number:06d}_10.png"
+        left = cv2.cvtColor(cv2.imread(str(tmp_path / "training/image_2" / file)), cv2.COLOR_BGR2RGB)
+        right = cv2.cvtColor(cv2.imread(str(tmp_path / "training/image_3" / file)), cv2.COLOR_BGR2RGB)
+        assert (left == sample.left).all()
+        assert (right == sample.right).all()
+        everywhere, valid = read_kitti(tmp_path / "training/disp_occ_0" / file)
+        assert (valid == (sample.disparity_left > 0)).all()
+        assert np.abs(everywhere - sample.disparity_left)[valid].max() <= 0.5 / 256 + 1e-6
+        visible, seen = read_kitti(tmp_path / "training/disp_noc_0" / file)
+        assert (seen == valid & (sample.occlusion_left == 0)).all()
+        assert 0 < seen.sum() < valid.sum()
+        assert (visible[seen] == everywhere[seen]).all()
+        objects = cv2.imread(str(tmp_path / "training/obj_map" / file), cv2.IMREAD_UNCHANGED)
+        assert objects.dtype == np.uint8
+        assert (objects == sample.object_index_left).all()
+    lines = (tmp_path / "training/calib_cam_to_cam/000000.txt").read_text().splitlines()
+    words = dict(line.split(": ") for line in lines)
+    left, right = (np.array(words[f"P_rect_{k}"].split(), float).reshape(3, 4) for k in ("02", "03"))
+    camera = StereoDataset(analytic_dataset, "train")[0].scene_record.camera
+    point = np.array([0.3, -0.2, 4.0, 1.0])
+    one, two = ((p @ point)[:2] / (p @ point)[2] for p in (left, right))
+    assert one[0] - two[0] == pytest.approx(camera.focal_px * camera.baseline_m / 4.0)
+    assert one[1] == two[1]
+    assert len(list((tmp_path / "testing/image_2").iterdir())) == 2
+
+
+def test_kitti_disparities_at_the_ends_of_what_it_can_store() -> None:
+    disparity = np.array([[0.0, 1e-4, 255.99, 256.1, np.nan, np.inf, 3.0]], np.float32)
+    keep = np.array([[True] * 6 + [False]])
+    assert encode_disparity(disparity, keep).tolist() == [[0, 1, 65533, 0, 0, 0, 0]]
+
+
+def test_a_laser_scanner_measures_few_pixels_in_even_lines(analytic_dataset: Path, tmp_path: Path) -> None:
+    mask = lidar_mask(375, 1242, 721.5, 64)
+    assert 0.03 < mask.mean() < 0.06
+    assert not mask[:140].any()  # Nothing above the highest beam, 2 degrees over the horizon.
+    column = np.flatnonzero(mask[:, 621])
+    assert 45 <= len(column) <= 64
+    # Beams are 26.9 / 63 degrees apart: 5.4 pixels at the horizon, more below it.
+    assert np.diff(column)[:5].mean() == pytest.approx(5.4, abs=0.5)
+    with pytest.raises(ValueError, match="at least one beam"):
+        lidar_mask(10, 10, 10.0, 0)
+    export(analytic_dataset, "kitti", tmp_path, "--lidar-beams", "64")
+    sparse = read_kitti(tmp_path / "training/disp_occ_0/000000_10.png")[1]
+    sample = StereoDataset(analytic_dataset, "train")[0]
+    beams = lidar_mask(*sample.size, sample.scene_record.camera.focal_px, 64)
+    assert (sparse == beams & (sample.disparity_left > 0)).all()
+
+
+def test_webdataset_shards_stream_the_same_bytes(analytic_dataset: Path, tmp_path: Path) -> None:
+    export(analytic_dataset, "webdataset", tmp_path / "a", "--frames-per-shard", "3")
+    assert [path.name for path in sorted((tmp_path / "a").iterdir())] == [
+        "index.json",
+        "recipe.yaml",
+        "test-000000.tar",
+        "train-000000.tar",
+        "train-000001.tar",
+    ]
+    ours = open_source(f"webdataset:{tmp_path / 'a'}").frames("train")
+    native = StereoDataset(analytic_dataset, "train")
+    for one, other in zip(ours, native, strict=True):
+        assert (one.disparity_right == other.disparity_right).all()
+    shards = [str(tmp_path / "a" / f"train-00000{k}.tar") for k in range(2)]
+    samples = list(webdataset.WebDataset(shards, shardshuffle=False))
+    frames = StereoDataset(analytic_dataset, "train")
+    assert [sample["__key__"] for sample in samples] == [
+        f"train-000{k // 2}-000{6 + k % 2}" for k in range(4)
+    ]
+    layout = Layout(analytic_dataset)
+    for sample, frame in zip(samples, frames, strict=True):
+        members = {name for name in sample if not name.startswith("__")}
+        assert members == {
+            *(f"{eye}.png" for eye in ("left", "right")),
+            *(f"disparity_{eye}.pfm" for eye in ("left", "right")),
+            *(f"disparity_gradient_{eye}.exr" for eye in ("left", "right")),
+            *(f"{kind}_{eye}.png" for kind in ("occlusion", "object_index") for eye in ("left", "right")),
+            "meta.json",
+        }
+        disparity = layout.file("disparity", "train", frame.scene, "right", frame.frame)
+        assert sample["disparity_right.pfm"] == disparity.read_bytes()
+        decoded = cv2.imdecode(np.frombuffer(sample["left.png"], np.uint8), cv2.IMREAD_COLOR)
+        assert (decoded[..., ::-1] == frame.left).all()
+        meta = json.loads(sample["meta.json"])
+        assert (meta["scene"], meta["frame"], meta["render_pass"]) == (frame.scene, frame.frame, "clean")
+        assert meta["baseline_m"] == frame.scene_record.camera.baseline_m
+
+
+def test_exporting_twice_gives_the_same_bytes(analytic_dataset: Path, tmp_path: Path) -> None:
+    for kind in ("kitti", "webdataset"):
+        digests = []
+        for out in (tmp_path / kind / "a", tmp_path / kind / "b"):
+            export(analytic_dataset, kind, out)
+            files = sorted(path for path in out.rglob("*") if path.is_file())
+            digests.append([hashlib.sha256(path.read_bytes()).hexdigest() for path in files])
+        assert digests[0] == digests[1]
+        assert len(digests[0]) > 1
+
+
+def test_sceneflow_is_the_published_part_of_the_data_set(analytic_dataset: Path, tmp_path: Path) -> None:
+    export(analytic_dataset, "sceneflow", tmp_path / "out")
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "frames_cleanpass",
+        "disparity",
+        "camera_data",
+    }
+    files = [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
+    assert len(files) == 3 * (2 * 2 * 2 + 1)
+    for path in files:
+        original = analytic_dataset / path.relative_to(tmp_path / "out")
+        assert path.read_bytes() == original.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("flags", "code", "says"),
+    [
+        (["--format", "kitti", "--out", "{data}"], 2, "another place"),
+        (["--format", "webdataset", "--frames-per-shard", "0", "--out", "{tmp}/x"], 2, "at least 1"),
+        (["--format", "kitti", "--lidar-beams", "0", "--out", "{tmp}/x"], 2, "at least 1"),
+    ],
+)
+def test_refusals(
+    analytic_dataset: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    flags: list[str],
+    code: int,
+    says: str,
+) -> None:
+    words = [flag.format(data=analytic_dataset, tmp=tmp_path) for flag in flags]
+    with pytest.raises(SystemExit) as end:
+        main(["export", str(analytic_dataset), *words])
+    assert end.value.code == code
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
