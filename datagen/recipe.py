@@ -20,6 +20,7 @@ from scenes.serialization import from_plain, to_plain
 from storage import write_text
 
 MAX_RECIPE_BYTES = 1 << 20
+MAX_RECIPE_DEPTH = 32
 
 
 @dataclass(frozen=True)
@@ -110,10 +111,20 @@ def recipe_from_text(text: bytes, origin: str) -> Recipe:
     if len(text) > MAX_RECIPE_BYTES:
         raise DatasetError(f"cannot read the recipe {origin}: {len(text)} bytes are more than any recipe has")
     try:
+        _check_shape(text.decode("utf-8"))
         data = yaml.safe_load(text.decode("utf-8"))
     except (UnicodeDecodeError, yaml.YAMLError, RecursionError, ValueError) as error:
         raise DatasetError(f"cannot read the recipe {origin}: {' '.join(str(error).split())}") from error
     return recipe_from_plain(data, origin)
+
+
+def _check_shape(text: str) -> None:
+    """Raise ValueError for nesting and repetition by reference that no recipe has and that could grow without end."""
+    depth = 0
+    for event in yaml.parse(text, yaml.SafeLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if isinstance(event, yaml.AliasEvent) or depth > MAX_RECIPE_DEPTH:
+            raise ValueError("it refers to another place in it or is nested too deeply")
 
 
 def read_recipe(path: Path) -> Recipe:

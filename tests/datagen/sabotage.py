@@ -75,7 +75,7 @@ def hashes(root: Path) -> dict[str, str]:
         data = path.read_bytes()
         if name.startswith("manifest/"):
             manifest = json.loads(data)
-            del manifest["seconds"]
+            del manifest["seconds"], manifest["manifest_sha256"]
             data = json.dumps(manifest).encode()
         found[name] = hashlib.sha256(data).hexdigest()
     return found
