@@ -75,7 +75,8 @@ def test_a_laser_scanner_measures_few_pixels_in_even_lines(analytic_dataset: Pat
     assert not mask[:140].any()  # Nothing above the highest beam, 2 degrees over the horizon.
     middle = np.flatnonzero(mask.any(axis=0))
     column = np.flatnonzero(mask[:, middle[len(middle) // 2]])
-    assert 45 <= len(column) <= 64
+    # The picture's lower edge is 14.6 degrees under the horizon, the highest beam 2 degrees over it.
+    assert len(column) == pytest.approx((14.6 + 2.0) / (26.9 / 63), abs=1)
     # Beams are 26.9 / 63 degrees apart: 5.4 pixels at the horizon, more below it.
     assert np.diff(column)[:5].mean() == pytest.approx(5.4, abs=0.5)
     with pytest.raises(ValueError, match="at least one beam"):
