@@ -133,7 +133,7 @@ def test_a_data_set_carries_the_files_it_uses(user: Path, tmp_path: Path) -> Non
         "scenes: {train: 1}\nsamples: 1\nseed: 1\n"
     )
     folders = {name: user / name for name in ("meshes", "textures", "environments")}
-    Render(out=out, recipe=recipe, workers=1, **folders).run()
+    Render(out=str(out), recipe=recipe, workers=1, **folders).run()
     written = read_recipe(out / "recipe.yaml")
     assert len(written.assets.meshes) == 16
     statistics = read_manifest(Layout(out).manifest("train", 0)).statistics
