@@ -112,9 +112,9 @@ def test_rejected_scenes_are_drawn_anew_and_counted(tmp_path: Path) -> None:
 
 def test_giving_up_says_why(tmp_path: Path) -> None:
     summary = render_dataset(recipe(max_one_object=0.01, attempts=3), tmp_path / "set", workers=1)
-    ((name, sentence),) = summary.failures
-    assert name == "train/0000"
-    assert "3 attempts were degenerate: one surface fills the view (3)" in sentence
+    (failure,) = summary.failures
+    assert failure.name == "train/0000"
+    assert "3 attempts were degenerate: one surface fills the view (3)" in failure.reason
 
 
 def test_impossible_curation_is_refused() -> None:
