@@ -1,0 +1,226 @@
+"""The MRF's solver beside its rivals: seconds, deviation from the direct solution, growth with size, memory.
+
+    python -m benchmarks.refine --data DATASET [--repeat 3] [--threads 2] [--skip-direct] [--large] [--crop 100]
+
+Takes the first frame of a rendered data set. Until networks are trained on it, its inputs are made of real
+parts: OpenCV's SGBM with holes filled as initial disparity, its left-right agreement as confidence (0 over
+large areas), the true gradients with noise. "sparse" keeps one confident pixel in a hundred.
+
+Every rival solves the same arrays, weights and set-up included, in turn within each repetition; the table gives
+medians of wall clock and CPU. The rivals know one thread only; --threads is ours. pyamg comes with the development
+requirements.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+import numba
+import numpy as np
+
+from refine.parameters import MRFParameters
+from refine.system import Form, build_system
+from refine.weights import Floats
+
+Inputs = tuple[Floats, Floats, Floats, np.ndarray]
+
+
+def frame_inputs(root: Path, split: str) -> Inputs:
+    """Disparity, confidence, gradient and image of the data set's first frame."""
+    from datagen import StereoDataset
+    from matching import fill_background, match_sgbm
+    from refine.metrics import forward_gradient
+
+    sample = StereoDataset(root, split)[0]
+    left, right = sample.left, sample.right
+    found = match_sgbm(left, right)
+    mirrored = match_sgbm(np.ascontiguousarray(right[:, ::-1]), np.ascontiguousarray(left[:, ::-1]))[:, ::-1]
+    column = np.arange(left.shape[1]) - np.nan_to_num(found)
+    nearest = np.clip(np.rint(column).astype(int), 0, left.shape[1] - 1)
+    apart = np.abs(found - np.take_along_axis(mirrored, nearest, axis=1))
+    confidence = np.where(np.isfinite(apart) & (column > 0), np.exp(-(np.nan_to_num(apart) ** 2) / 2), 0)
+    confidence[confidence < 0.05] = 0
+    rng = np.random.default_rng(0)
+    gradient = forward_gradient(sample.disparity_left)
+    gradient = np.where(np.abs(gradient) <= 1, gradient, 0) + rng.normal(0, 0.05, gradient.shape)
+    return fill_background(found).astype(np.float64), confidence, gradient, left
+
+
+def sparse(inputs: Inputs) -> Inputs:
+    """The same with confidence 0 at 99 of 100 pixels."""
+    disparity, confidence, gradient, image = inputs
+    keep = np.random.default_rng(1).random(confidence.shape) < 0.01
+    return disparity, np.where(keep, confidence, 0), gradient, image
+
+
+def ours(inputs: Inputs, form: Form) -> Floats:
+    from refine import solve_mrf
+
+    return solve_mrf(*inputs, form=form, solver="multigrid").disparity
+
+
+def pyamg_cg(inputs: Inputs, form: Form) -> Floats:
+    """Ruge and Stueben's multigrid on A itself, and CG."""
+    import pyamg
+
+    system = build_system(*inputs, MRFParameters(), form)
+    hierarchy = pyamg.ruge_stuben_solver(system.matrix().tocsr())
+    solved: Floats = hierarchy.solve(
+        system.right_hand_side, x0=inputs[0].ravel(), tol=1e-7, accel="cg", maxiter=1000
+    )
+    return solved.reshape(system.shape)
+
+
+def pyamg_m_matrix(inputs: Inputs, form: Form) -> Floats:
+    """CG on A, preconditioned by Ruge and Stueben's multigrid on the M-matrix: this project's former solver."""
+    import pyamg
+    from scipy.sparse.linalg import LinearOperator, cg
+
+    system = build_system(*inputs, MRFParameters(), form)
+    hierarchy = pyamg.ruge_stuben_solver(
+        system.m_matrix(),
+        max_coarse=200,
+        CF=("RS", {"second_pass": True}),
+        strength=("classical", {"theta": 0.5}),
+        presmoother=("gauss_seidel", {"sweep": "forward"}),
+        postsmoother=("gauss_seidel", {"sweep": "backward"}),
+    )
+    size = inputs[0].size
+    solved, _ = cg(
+        LinearOperator((size, size), matvec=system.apply, dtype=np.float64),
+        system.right_hand_side,
+        x0=inputs[0].ravel(),
+        rtol=1e-7,
+        M=hierarchy.aspreconditioner(),
+        maxiter=1000,
+    )
+    return solved.reshape(system.shape)
+
+
+def spsolve(inputs: Inputs, form: Form) -> Floats:
+    from scipy.sparse.linalg import spsolve as scipy_spsolve
+
+    system = build_system(*inputs, MRFParameters(), form)
+    solved: Floats = scipy_spsolve(system.matrix().tocsc(), system.right_hand_side)
+    return solved.reshape(system.shape)
+
+
+def timed(run: Callable[[], Floats]) -> tuple[Floats, float, float]:
+    wall, cpu = time.perf_counter(), time.process_time()
+    result = run()
+    return result, time.perf_counter() - wall, time.process_time() - cpu
+
+
+def compare(name: str, inputs: Inputs, form: Form, rivals: list[Callable[..., Floats]], repeat: int) -> None:
+    """One table: all rivals in turn, `repeat` times."""
+    from refine import solve_mrf
+
+    reference = solve_mrf(*inputs, form=form, solver="direct").disparity
+    ours(inputs, form)  # compiles
+    runs: dict[str, list[tuple[float, float]]] = {rival.__name__: [] for rival in rivals}
+    deviation = {}
+    for _ in range(repeat):
+        for rival in rivals:
+            found, wall, cpu = timed(lambda rival=rival: rival(inputs, form))  # type: ignore[misc]
+            runs[rival.__name__].append((wall, cpu))
+            deviation[rival.__name__] = np.abs(found - reference).max()
+    height, width = reference.shape
+    print(f"\n{name}, {form} form, {width}x{height}\n")
+    print("| solver | seconds | CPU seconds | times ours | largest deviation, px |\n|---|---|---|---|---|")
+    base = median(wall for wall, _ in runs["ours"])
+    for rival, times in runs.items():
+        wall, cpu = (median(column) for column in zip(*times, strict=True))
+        print(
+            f"| {rival} | {wall:.2f} | {cpu:.2f} | {wall / base:.1f} | {deviation[rival]:.4f} |", flush=True
+        )
+
+
+def enlarged(inputs: Inputs, factor: int) -> Inputs:
+    """A larger world of the same grain: the frame tiled, every other tile mirrored."""
+    disparity, confidence, gradient, image = inputs
+
+    def tile(values: np.ndarray) -> np.ndarray:
+        row = np.concatenate([values if i % 2 == 0 else values[:, ::-1] for i in range(factor)], axis=1)
+        return np.concatenate([row if i % 2 == 0 else row[::-1] for i in range(factor)], axis=0)
+
+    return tile(disparity), tile(confidence), tile(gradient), tile(image)
+
+
+def measure_size(path: str) -> None:
+    """Child process: one solve of the stored arrays; megapixels, seconds, memory in float32 images."""
+    from refine import solve_mrf
+    from tests.refine.worlds import random_problem
+
+    solve_mrf(*random_problem(70, 90, 0).inputs, solver="multigrid")  # loads the compiled kernels
+    with np.load(path) as stored:
+        inputs = tuple(stored[key] for key in ("disparity", "confidence", "gradient", "image"))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    solution = solve_mrf(*inputs, solver="multigrid")
+    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
+    pixels = inputs[0].size
+    print(
+        f"| {inputs[0].shape[1]}x{inputs[0].shape[0]} | {solution.info.seconds:.2f} "
+        f"| {solution.info.seconds / pixels * 1e6:.2f} | {solution.info.iterations} | {grown / 4 / pixels:.0f} |"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--data", type=Path)
+    parser.add_argument("--split", default="train")
+    parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--skip-direct", action="store_true", help="leave spsolve on the paper's form out")
+    parser.add_argument("--large", action="store_true", help="also 1920x1080 and 3840x2160")
+    parser.add_argument("--child", help=argparse.SUPPRESS)
+    parser.add_argument("--crop", type=int, default=0, help="only this many pixels from the centre each way")
+    options = parser.parse_args()
+    numba.set_num_threads(options.threads)
+    if options.child:
+        measure_size(options.child)
+        return
+    inputs = frame_inputs(options.data, options.split)
+    if options.crop:
+        middle = tuple(slice(max(0, n // 2 - options.crop), n // 2 + options.crop) for n in inputs[0].shape)
+        inputs = inputs[0][middle], inputs[1][middle], inputs[2][middle], inputs[3][middle]
+    known = inputs[1] > 0
+    print(f"confidence is 0 at {1 - known.mean():.0%} of the pixels; {options.threads} threads")
+    exact = [ours, pyamg_m_matrix, pyamg_cg]
+    compare("SGBM", inputs, "exact", exact, options.repeat)
+    compare("sparse", sparse(inputs), "exact", exact, options.repeat)
+    if not options.skip_direct:
+        compare("SGBM", inputs, "paper", [ours, spsolve], options.repeat)
+    print(
+        "\n| size | seconds | microseconds a pixel | iterations | peak, float32 images |\n|---|---|---|---|---|"
+    )
+    for factor in (1, 2, 4) if options.large else (1,):
+        with tempfile.TemporaryDirectory() as folder:
+            path = f"{folder}/inputs.npz"
+            keys = ("disparity", "confidence", "gradient", "image")
+            np.savez(path, **dict(zip(keys, enlarged(inputs, factor), strict=True)))
+            subprocess.run(
+                [
+                    sys.executable,
+                    "-m",
+                    "benchmarks.refine",
+                    "--threads",
+                    str(options.threads),
+                    "--child",
+                    path,
+                ],
+                check=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
