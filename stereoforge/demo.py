@@ -32,9 +32,9 @@ class DemoPlan:
             width=384, height=192, frames=4, background_objects=(60, 90)
         )
     )
-    scenes: dict[str, int] = field(default_factory=lambda: {"train": 36, "val": 4, "test": 5})
+    scenes: dict[str, int] = field(default_factory=lambda: {"train": 30, "val": 4, "test": 4})
     steps: dict[str, int] = field(
-        default_factory=lambda: {"regressor": 1600, "confnet": 200, "gradnet": 200, "regressor_f": 100}
+        default_factory=lambda: {"regressor": 1300, "confnet": 200, "gradnet": 200, "regressor_f": 100}
     )
     """Training steps of each network's `tiny` preset."""
     gallery_scenes: int = 16
