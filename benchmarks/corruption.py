@@ -77,7 +77,7 @@ def make_examples(folder: Path) -> dict[str, Path]:
         "exr": folder / "a.exr",
         "camera data": folder / "camera_data.txt",
         "manifest": folder / "manifest.json",
-        "scene": folder / "scene.json",
+        "scene": folder / "scenes" / "TRAIN" / "A" / "0000.json",
         "recipe": folder / "recipe.yaml",
         "weights": folder / "run" / "regressor.safetensors",
         "tar": folder / "train-000000.tar",
@@ -92,6 +92,7 @@ def make_examples(folder: Path) -> dict[str, Path]:
     entry = FileEntry("a/b", 3, "a1" * 32)
     write_manifest(paths["manifest"], SceneManifest("f", "train", 3, "0" * 64, (entry,), {"x": 1.0}))
     config = FLYING_THINGS.config(flying_objects=(1, 1), background_objects=(1, 1))
+    paths["scene"].parent.mkdir(parents=True)
     paths["scene"].write_text(scene_to_json(sample_scene(rng, "flying_things", config)))
     write_recipe(paths["recipe"], Recipe(config, {"train": 3}))
     _write_weights(paths["weights"])

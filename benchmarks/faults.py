@@ -44,7 +44,12 @@ from tests.datagen.sabotage import Sabotage, hashes, without
 from workers import Limits, WorkerError, WorkerProcess
 
 WORLD = FAMILIES["flying_things"].config(
-    width=64, height=32, flying_objects=(1, 1), background_objects=(1, 1), background_materials=(1, 1)
+    width=64,
+    height=32,
+    flying_objects=(1, 1),
+    background_objects=(1, 1),
+    background_materials=(1, 1),
+    pitch_deg=(25.0, 30.0),
 )
 LIMITS = Limits(timeout_s=60.0, memory_bytes=1500 << 20)
 

@@ -6,6 +6,7 @@ without harm to the others. It dies with the process that started it.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import faulthandler
@@ -91,6 +92,9 @@ class WorkerProcess:
         )
         self._process.start()
         theirs.close()
+        atexit.register(
+            self.stop
+        )  # At exit multiprocessing waits for its children, and ours waits for calls.
         self._deadline = 0.0
         self._end: _Returned | _Raised | None = None
 
@@ -154,6 +158,7 @@ class WorkerProcess:
 
     def stop(self) -> None:
         """End the process at once, whatever it is doing, and wait until it is gone."""
+        atexit.unregister(self.stop)
         self._process.kill()
         self._process.join()
         self._connection.close()

@@ -6,7 +6,6 @@ keeps one supervised process, so time limit, memory limit, retries and logs are 
 
 from __future__ import annotations
 
-import atexit
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -124,7 +123,6 @@ def _run_supervised(
     global _supervisor
     if _supervisor is None or _supervisor.policy != policy:
         _supervisor = Supervisor(policy)
-        atexit.register(_supervisor.stop)
     _supervisor.start(function, job)
     try:
         while (outcome := _supervisor.poll()) is None:

@@ -22,7 +22,12 @@ from workers import Limits
 NOT_DATA = ("logs", "quarantine")
 
 WORLD = FAMILIES["flying_things"].config(
-    width=64, height=36, flying_objects=(1, 1), background_objects=(1, 1), background_materials=(1, 1)
+    width=64,
+    height=36,
+    flying_objects=(1, 1),
+    background_objects=(1, 1),
+    background_materials=(1, 1),
+    pitch_deg=(25.0, 30.0),
 )
 RECIPE = Recipe(WORLD, {"train": 4}, seed=3, samples=1)
 """Four of the smallest scenes there are."""

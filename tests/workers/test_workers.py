@@ -122,6 +122,26 @@ if __name__ == "__main__":
 """
 
 
+FORGETFUL = """
+from tests.workers.test_workers import add
+from workers import WorkerProcess
+if __name__ == "__main__":
+    worker = WorkerProcess()
+    worker.start(add, 1, 2)
+"""
+
+
+@pytest.mark.slow
+def test_a_program_that_forgets_its_worker_still_ends(tmp_path: Path) -> None:
+    script = tmp_path / "forgetful.py"
+    script.write_text(FORGETFUL)
+    environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
+    assert (
+        subprocess.run([sys.executable, str(script)], env=environment, timeout=120, check=False).returncode
+        == 0
+    )
+
+
 @pytest.mark.slow
 def test_a_worker_dies_with_a_parent_that_is_killed(tmp_path: Path) -> None:
     script = tmp_path / "parent.py"
