@@ -378,7 +378,8 @@ def _fill_interpolation(start, column, value, diagonal, state, number, strength,
                 weight[at] = value[e]
                 at += 1
         for e in range(place[i], at):
-            weight[e] *= total / (kept * diagonal[i])
+            # Across a hard edge all couplings may be next to nothing, and kept * diagonal would underflow.
+            weight[e] = weight[e] / kept * (total / diagonal[i])
 
 
 @njit(cache=True)

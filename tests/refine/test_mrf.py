@@ -303,5 +303,20 @@ def test_no_warning_in_the_usual_case():
         refine_disparity(*random_problem(70, 70, seed=13).inputs)
 
 
+@pytest.mark.parametrize("step", [(21, 21, 21), (10, 10, 34), (8, 15, 33), (4, 11, 35), (0, 22, 30)])
+def test_couplings_next_to_nothing_do_not_stop_the_multigrid(step):
+    """Pixels at the ends of bars, tied to them by 1e-43 to 1e-45 (without the colour term) and to nothing else."""
+    problem = random_problem(70, 90, seed=6)
+    bars = np.zeros((70, 90, 3), np.uint8)
+    bars[::3, 10:80] = 150
+    bars[::3, 80] = 150 + np.array(step)
+    inputs = (problem.disparity, 0.2 * problem.confidence, problem.gradient, bars)
+    parameters = MRFParameters(beta=0.0)
+    solution = solve_mrf(*inputs, parameters, solver="multigrid")
+    assert not solution.info.fell_back
+    direct = solve_mrf(*inputs, parameters, solver="direct")
+    np.testing.assert_allclose(solution.disparity, direct.disparity, rtol=0, atol=1e-3)
+
+
 def test_neighbours_are_the_eight_around():
     assert set(NEIGHBORS) == {(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)} - {(0, 0)}
