@@ -77,8 +77,8 @@ def render(scene: Scene, variant: Variant, scratch: Path) -> tuple[NDArray[np.fl
                 setattr(owner, name, value)
         render_view(world, "right", 0, scratch)  # builds the acceleration structures all views share
         started = time.process_time()
-        view = render_view(world, "left", 0, scratch)
-        return view.radiance, time.process_time() - started
+        radiance = render_view(world, "left", 0, scratch)
+        return radiance, time.process_time() - started
 
 
 def psnr(picture: NDArray[np.uint8], reference: NDArray[np.uint8]) -> float:

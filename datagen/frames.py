@@ -14,15 +14,9 @@ from numpy.typing import NDArray
 
 from datagen.exposure import automatic_exposure, develop
 from datagen.final_pass import Sensor
-from datagen.ground_truth import (
-    OcclusionTester,
-    RectifiedPair,
-    disparity_from_depth,
-    forward_differences,
-    gradient_validity,
-    to_camera_frame,
-)
+from datagen.ground_truth import forward_differences, gradient_validity
 from datagen.layout import EYES, Direction, Eye
+from datagen.raycast import Hits, SceneRayCaster
 from datagen.scene_geometry import SceneGeometry
 from datagen.surface_targets import ExtraTargets
 from scenes import Scene
@@ -101,9 +95,8 @@ def render_frames(
     a time. Raises BlenderError, and RuntimeError on a Python without bpy.
     """
     # Imported here so that planning, verifying and training work on a Python without Blender.
-    from datagen.blender.build import build_world, place
+    from datagen.blender.build import build_world
     from datagen.blender.final import render_final
-    from datagen.blender.geometry import evaluated_triangles
     from datagen.blender.session import CyclesSettings, quiet, start_empty_file
     from datagen.blender.view import render_view
 
@@ -115,31 +108,28 @@ def render_frames(
             geometry = geometry or SceneGeometry(scene)
             settings = CyclesSettings(options.samples, options.device, options.threads)
             world = build_world(geometry, start_empty_file(settings))
-        extra_targets, sensor = ExtraTargets(geometry, options.targets), Sensor(scene)
+        caster, sensor = SceneRayCaster(geometry), Sensor(scene)
+        extra_targets = ExtraTargets(geometry, caster, options.targets)
         for frame in range(scene.frames):
             with watch.step("render"), quiet(log):
                 views = {eye: render_view(world, eye, frame, scratch) for eye in EYES}
             if exposure is None:  # One exposure a scene: a camera does not flicker.
-                exposure = automatic_exposure(views["left"].radiance, scene.exposure_key)
-            images = {eye: {"clean": develop(view.radiance, exposure)} for eye, view in views.items()}
+                exposure = automatic_exposure(views["left"], scene.exposure_key)
+            images = {eye: {"clean": develop(radiance, exposure)} for eye, radiance in views.items()}
             if "final" in options.passes:
                 with watch.step("render_final"), quiet(log):
                     for eye, radiance in render_final(world, frame, exposure, scratch).items():
                         light = sensor.expose(radiance, exposure, eye, frame)
                         images[eye]["final"] = develop(light, 1.0)
             with watch.step("ground_truth"):
-                place(world, "left", frame)
-                tester = _occlusion_tester(scene, frame, evaluated_triangles())
                 targets = {
                     eye: _targets(
                         {name: images[eye][name] for name in options.passes},
-                        disparity_from_depth(view.depth_m, scene.camera.disparity_metres),
+                        caster.cast_all(eye, frame),
                         options.gradient_threshold_px,
-                        tester.labels(eye, view.depth_m),
-                        view.object_index,
-                        extra_targets.make(eye, frame, view.object_index),
+                        extra_targets.make(eye, frame),
                     )
-                    for eye, view in views.items()
+                    for eye in EYES
                 }
             yield frame, targets
     except RuntimeError as error:
@@ -149,18 +139,19 @@ def render_frames(
 
 def _targets(
     images: dict[str, NDArray[np.uint8]],
-    disparity: NDArray[np.float32],
+    hits: Hits,
     gradient_threshold_px: float,
-    occlusion: NDArray[np.uint8],
-    object_index: NDArray[np.uint16],
     extra: dict[tuple[str, Direction | None], NDArray[Any]],
 ) -> EyeTargets:
+    shape = next(iter(images.values())).shape[:2]
+    disparity = hits.disparity.astype(np.float32).reshape(shape)
     gradient = forward_differences(disparity)
-    valid = gradient_validity(gradient, gradient_threshold_px)
-    return EyeTargets(images, disparity, gradient, valid, occlusion, object_index, extra)
-
-
-def _occlusion_tester(scene: Scene, frame: int, triangles: NDArray[np.float64]) -> OcclusionTester:
-    camera = scene.camera
-    pair = RectifiedPair(camera.width, camera.height, camera.focal_px, camera.baseline_m)
-    return OcclusionTester(to_camera_frame(triangles, camera.pose("left", frame)), pair)
+    return EyeTargets(
+        images,
+        disparity,
+        gradient,
+        gradient_validity(gradient, gradient_threshold_px),
+        hits.occlusion.reshape(shape),
+        hits.object_index.astype(np.uint16).reshape(shape),
+        extra,
+    )

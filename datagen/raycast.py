@@ -1,4 +1,8 @@
-"""Disparity of a Scene by casting rays at its meshes: without Blender, to check what Blender rendered."""
+"""Ground truth of a Scene by casting rays at its meshes: disparity, object index and occlusion, exact at pixel centres.
+
+Blender is not asked. The meshes it renders are the same, but the first sample of Cycles, which its depth pass keeps,
+is off the pixel's centre by some 5e-4 px, and its depth is in 32 bits: enough to miss leaves and wires.
+"""
 
 from __future__ import annotations
 
@@ -67,6 +71,11 @@ class SceneRayCaster:
         outside = (x_other < 0) | (x_other > camera.width)
         labels = np.where(outside, OUT_OF_FRAME, np.where(hidden, OCCLUDED, VISIBLE))
         return Hits(disparity, index, labels.astype(np.uint8))
+
+    def cast_all(self, eye: Eye, time_frames: float) -> Hits:
+        """First hits through the centres of all pixels, in reading order."""
+        rows, columns = np.indices((self._scene.camera.height, self._scene.camera.width)).reshape(2, -1)
+        return self.cast(eye, time_frames, rows, columns)
 
     def surface_points(
         self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]

@@ -43,6 +43,11 @@ class PixelSurfaces:
         self._rays = np.stack([x, -y, np.full_like(x, -1.0)], -1)
         """Directions through the pixels' centres in the camera's frame (x right, y up, looking along -z)."""
 
+    def materials(self) -> NDArray[np.uint16]:
+        """(H, W) 0 for the sky, else 1 + the index in `Scene.materials`."""
+        worn = np.array([thing.material for thing in self._geometry.scene.objects])
+        return self._picture(1.0 + worn[self._owners], np.zeros(len(self._met))).astype(np.uint16)
+
     def normals(self) -> NDArray[np.float32]:
         """(H, W, 3) unit normals of the triangles in the camera's frame, towards the eye; 0 for the sky."""
         a, b, c = np.moveaxis(self._seen_from(self._time)[self._corners], 1, 0)
@@ -111,22 +116,18 @@ class PixelSurfaces:
 class ExtraTargets:
     """Makes the targets a recipe asks for besides the basic ones."""
 
-    def __init__(self, geometry: SceneGeometry, kinds: tuple[str, ...]) -> None:
+    def __init__(self, geometry: SceneGeometry, caster: SceneRayCaster, kinds: tuple[str, ...]) -> None:
         """kinds: among `datagen.layout.EXTRA_TARGETS`."""
-        self._geometry, self._kinds = geometry, kinds
-        self._caster = SceneRayCaster(geometry)
+        self._geometry, self._caster, self._kinds = geometry, caster, kinds
 
-    def make(
-        self, eye: Eye, frame: int, object_index: NDArray[np.uint16]
-    ) -> dict[tuple[str, Direction | None], NDArray[Any]]:
-        """The arrays of one eye and frame, by kind and direction. object_index: (H, W) as rendered."""
+    def make(self, eye: Eye, frame: int) -> dict[tuple[str, Direction | None], NDArray[Any]]:
+        """The arrays of one eye and frame, by kind and direction."""
         made: dict[tuple[str, Direction | None], NDArray[Any]] = {}
-        if "material_index" in self._kinds:
-            worn = [0, *(1 + thing.material for thing in self._geometry.scene.objects)]
-            made["material_index", None] = np.array(worn, np.uint16)[object_index]
-        if set(self._kinds) <= {"material_index"}:
+        if not self._kinds:
             return made
         surfaces = PixelSurfaces(self._caster, self._geometry, eye, frame)
+        if "material_index" in self._kinds:
+            made["material_index", None] = surfaces.materials()
         if "normals" in self._kinds:
             made["normals", None] = surfaces.normals()
         for direction in DIRECTIONS:

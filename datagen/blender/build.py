@@ -69,7 +69,6 @@ def _build_objects(
             if thing.deformation is None:
                 shared[key] = mesh
         block = bpy.data.objects.new(thing.name, mesh)
-        block.pass_index = index + 1
         block.rotation_mode = "QUATERNION"
         blender_scene.collection.objects.link(block)
         block.matrix_world = Matrix(thing.pose(0.0).tolist())

@@ -11,6 +11,13 @@ from numpy.typing import NDArray
 NEAR_M = 1e-6
 
 
+def to_camera_frame(
+    triangles: NDArray[np.float64], camera_to_world: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """World-space corners (T, 3, 3) in the frame of a camera with the given (4, 4) pose (a rigid motion)."""
+    return (triangles - camera_to_world[:3, 3]) @ camera_to_world[:3, :3]
+
+
 @njit(cache=True)
 def cast_depth(
     triangles: NDArray[np.float64], width: int, height: int, focal_px: float, shift_px: float = 0.0
@@ -71,3 +78,24 @@ def _inside(t: NDArray[np.float64], nx: float, ny: float, nz: float, px: float, 
         if side < 0.0:
             return False
     return True
+
+
+def segment_is_blocked(
+    triangles: NDArray[np.float64], start: NDArray[np.float64], way: NDArray[np.float64], reach: float
+) -> bool:
+    """Whether any triangle (T, 3, 3) meets start + s way with 0 < s < reach (Moeller and Trumbore 1997)."""
+    first, along, across = (
+        triangles[:, 0],
+        triangles[:, 1] - triangles[:, 0],
+        triangles[:, 2] - triangles[:, 0],
+    )
+    p = np.cross(way, across)
+    determinant = np.einsum("ij,ij->i", along, p)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1 / determinant
+        t = start - first
+        u = np.einsum("ij,ij->i", t, p) * inverse
+        q = np.cross(t, along)
+        v = q @ way * inverse
+        s = np.einsum("ij,ij->i", across, q) * inverse
+        return bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (s > 0) & (s < reach)).any())

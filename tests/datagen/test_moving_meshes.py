@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from datagen.frames import EyeTargets, RenderOptions, render_frames
-from datagen.ground_truth import to_camera_frame
 from datagen.layout import EYES, Eye
 from datagen.raycast import SceneRayCaster
 from datagen.scene_geometry import SceneGeometry
@@ -20,7 +19,7 @@ from scenes.deformations.sway import Sway
 from scenes.motion import quaternion
 from scenes.shapes.basic import Superquadric
 from scenes.spec import SceneObject, Trajectory
-from tests.datagen.oracle import cast_depth
+from tests.datagen.oracle import cast_depth, to_camera_frame
 from tests.datagen.worlds import Plate, plates
 
 WIDTH, HEIGHT, FRAMES = 96, 64, 3
@@ -59,7 +58,7 @@ Frames = list[tuple[dict[Eye, EyeTargets], NDArray[np.float64]]]
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Frames, int]:
     """The scene, and for each frame its arrays and the triangles Blender saw; the number of its meshes."""
-    from datagen.blender.geometry import evaluated_triangles
+    from tests.datagen.blender_geometry import evaluated_triangles
 
     scene = make_scene()
     frames = render_frames(scene, tmp_path_factory.mktemp("blender"), RenderOptions(samples=1))
@@ -120,5 +119,5 @@ def test_a_frame_looks_the_same_whatever_was_rendered_before(
         with quiet(tmp_path / "log"):
             world = build_world(SceneGeometry(rendered[0]), start_empty_file(CyclesSettings(samples=1)))
             views = [render_view(world, "left", frame, tmp_path) for frame in frames]
-        radiance.append(views[-1].radiance)
+        radiance.append(views[-1])
     assert np.array_equal(*radiance)
