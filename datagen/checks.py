@@ -158,6 +158,27 @@ def check_geometry(
     )
 
 
+def check_vectors(
+    values: NDArray[np.float32], expected: NDArray[np.float32], tolerance: float
+) -> Iterator[str]:
+    """Sampled values (N,) or (N, C) of a target agree with the scene's geometry; NaN where that is NaN."""
+    with np.errstate(invalid="ignore"):
+        same = np.abs(values - expected) <= tolerance * np.maximum(1, np.abs(expected))
+    same |= np.isnan(values) & np.isnan(expected)
+    yield from _too_many(
+        ~same.reshape(len(same), -1).all(axis=1),
+        MAX_OFF_GEOMETRY,
+        f"sampled values are over {tolerance} from the scene's geometry",
+    )
+
+
+def check_boundaries(marked: NDArray[np.bool_], expected: NDArray[np.bool_]) -> Iterator[str]:
+    """Motion boundaries are those that flow and object index make."""
+    wrong = int((marked != expected).sum())
+    if wrong:
+        yield f"{wrong} pixels are marked otherwise than optical flow and object index say"
+
+
 def _in_other_view(
     eye: Eye, disparity: NDArray[np.float32], other_disparity: NDArray[np.float32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]:

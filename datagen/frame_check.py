@@ -7,20 +7,28 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from datagen.checks import (
+    check_boundaries,
     check_disparity,
     check_geometry,
     check_gradient,
     check_images,
     check_object_index,
+    check_vectors,
     check_views,
 )
 from datagen.dataset import StereoSample
-from datagen.layout import EYES, FIRST_FRAME, RENDER_PASSES, Eye
+from datagen.layout import DIRECTIONS, EYES, FIRST_FRAME, RENDER_PASSES, Direction, Eye
 from datagen.raycast import SceneRayCaster
 from datagen.recipe import Recipe
+from datagen.surface_targets import PixelSurfaces, motion_boundaries
 from scenes import Scene
+
+NORMAL_TOLERANCE = 1e-4
+MOTION_TOLERANCE_PX = 1e-2
+"""Of flow and disparity change, and relative where they are above 1 px."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +62,15 @@ class FrameCheck:
         for eye in EYES:
             for message in self._check_view(eye):
                 yield self._file("disparity", eye), message
+            yield from self._check_extra_targets(eye)
         for sample in self.samples:
             messages = check_images(sample.left, sample.right, sample.disparity_left, sample.occlusion_left)
             for message in messages:
                 yield self._file(RENDER_PASSES[sample.render_pass], "right"), message
 
-    def _file(self, kind: str, eye: Eye) -> Path:
+    def _file(self, kind: str, eye: Eye, direction: Direction | None = None) -> Path:
         sample = self.samples[0]
-        return sample.layout.file(kind, sample.split, sample.scene, eye, sample.frame)
+        return sample.layout.file(kind, sample.split, sample.scene, eye, sample.frame, direction)
 
     def _check_view(self, eye: Eye) -> Iterator[str]:
         sample = self.samples[0]
@@ -72,12 +81,58 @@ class FrameCheck:
         yield from check_views(eye, view.disparity, other.disparity, view.occlusion)
         if self.caster is None:
             return
-        rng = np.random.default_rng((sample.scene, sample.frame, EYES.index(eye)))
-        pixels = rng.integers(0, view.disparity.size, self.sampled_pixels)
-        rows, columns = np.unravel_index(pixels, view.disparity.shape)
+        rows, columns = self._sampled(eye)
         yield from check_geometry(
             view.disparity[rows, columns],
             view.object_index[rows, columns],
             view.occlusion[rows, columns],
             self.caster.cast(eye, sample.frame - FIRST_FRAME, rows, columns),
         )
+
+    def _sampled(self, eye: Eye) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns of the pixels that are compared with the geometry."""
+        sample = self.samples[0]
+        rng = np.random.default_rng((sample.scene, sample.frame, EYES.index(eye)))
+        pixels = rng.integers(0, sample.size[0] * sample.size[1], self.sampled_pixels)
+        rows, columns = np.unravel_index(pixels, sample.size)
+        return rows, columns
+
+    def _check_extra_targets(self, eye: Eye) -> Iterator[tuple[Path, str]]:
+        """The targets that the recipe asks for besides the basic ones."""
+        sample, kinds = self.samples[0], self.recipe.targets
+        if not kinds or self.caster is None:
+            return
+        rows, columns = self._sampled(eye)
+        instant = sample.frame - FIRST_FRAME
+        surfaces = PixelSurfaces(self.caster, eye, instant, rows, columns)
+        if "material_index" in kinds:
+            stored = sample.material_index(eye)[rows, columns].astype(np.float32)
+            expected = surfaces.materials().astype(np.float32)
+            for message in check_vectors(stored, expected, 0.0):
+                yield self._file("material_index", eye), message
+        if "normals" in kinds:
+            for message in check_vectors(
+                sample.normals(eye)[rows, columns], surfaces.normals(), NORMAL_TOLERANCE
+            ):
+                yield self._file("normals", eye), message
+        for direction in DIRECTIONS:
+            yield from self._check_motion(eye, direction, surfaces)
+
+    def _check_motion(
+        self, eye: Eye, direction: Direction, surfaces: PixelSurfaces
+    ) -> Iterator[tuple[Path, str]]:
+        sample, kinds = self.samples[0], self.recipe.targets
+        rows, columns = self._sampled(eye)
+        flow = sample.flow(eye, direction) if "optical_flow" in kinds else None
+        if flow is not None:
+            for message in check_vectors(flow[rows, columns], surfaces.flow(direction), MOTION_TOLERANCE_PX):
+                yield self._file("optical_flow", eye, direction), message
+        if "disparity_change" in kinds:
+            change = sample.disparity_change(eye, direction)[rows, columns]
+            for message in check_vectors(change, surfaces.disparity_change(direction), MOTION_TOLERANCE_PX):
+                yield self._file("disparity_change", eye, direction), message
+        if "motion_boundaries" in kinds:
+            marked = sample.motion_boundaries(eye, direction)
+            expected = None if flow is None else motion_boundaries(flow, sample.view(eye).object_index)
+            for message in () if expected is None else check_boundaries(marked, expected):
+                yield self._file("motion_boundaries", eye, direction), message

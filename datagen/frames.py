@@ -109,7 +109,7 @@ def render_frames(
             settings = CyclesSettings(options.samples, options.device, options.threads)
             world = build_world(geometry, start_empty_file(settings))
         caster, sensor = SceneRayCaster(geometry), Sensor(scene)
-        extra_targets = ExtraTargets(geometry, caster, options.targets)
+        extra_targets = ExtraTargets(caster, options.targets)
         for frame in range(scene.frames):
             with watch.step("render"), quiet(log):
                 views = {eye: render_view(world, eye, frame, scratch) for eye in EYES}
@@ -122,15 +122,12 @@ def render_frames(
                         light = sensor.expose(radiance, exposure, eye, frame)
                         images[eye]["final"] = develop(light, 1.0)
             with watch.step("ground_truth"):
-                targets = {
-                    eye: _targets(
-                        {name: images[eye][name] for name in options.passes},
-                        caster.cast_all(eye, frame),
-                        options.gradient_threshold_px,
-                        extra_targets.make(eye, frame),
-                    )
-                    for eye in EYES
-                }
+                targets = {}
+                for eye in EYES:
+                    hits = caster.cast_all(eye, frame)
+                    chosen = {name: images[eye][name] for name in options.passes}
+                    extra = extra_targets.make(eye, frame, hits.object_index)
+                    targets[eye] = _targets(chosen, hits, options.gradient_threshold_px, extra)
             yield frame, targets
     except RuntimeError as error:
         tail = " | ".join(log.read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:])
@@ -143,15 +140,14 @@ def _targets(
     gradient_threshold_px: float,
     extra: dict[tuple[str, Direction | None], NDArray[Any]],
 ) -> EyeTargets:
-    shape = next(iter(images.values())).shape[:2]
-    disparity = hits.disparity.astype(np.float32).reshape(shape)
+    disparity = hits.disparity.astype(np.float32)
     gradient = forward_differences(disparity)
     return EyeTargets(
         images,
         disparity,
         gradient,
         gradient_validity(gradient, gradient_threshold_px),
-        hits.occlusion.reshape(shape),
-        hits.object_index.astype(np.uint16).reshape(shape),
+        hits.occlusion,
+        hits.object_index.astype(np.uint16),
         extra,
     )

@@ -49,7 +49,7 @@ class SceneRayCaster:
     """
 
     def __init__(self, geometry: SceneGeometry) -> None:
-        self._geometry = geometry
+        self.geometry = geometry
         self._scene = geometry.scene
         self._instant: float | None = None
 
@@ -62,7 +62,7 @@ class SceneRayCaster:
         directions = self._directions(rows, columns)
         disparity, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
         hidden = np.zeros(len(directions), bool)
-        if len(self._geometry.triangles):
+        if len(self.geometry.triangles):
             self._place(time_frames)
             own, other = self._eyes(eye)
             disparity, index = self._first_hits(own, directions)
@@ -73,9 +73,13 @@ class SceneRayCaster:
         return Hits(disparity, index, labels.astype(np.uint8))
 
     def cast_all(self, eye: Eye, time_frames: float) -> Hits:
-        """First hits through the centres of all pixels, in reading order."""
-        rows, columns = np.indices((self._scene.camera.height, self._scene.camera.width)).reshape(2, -1)
-        return self.cast(eye, time_frames, rows, columns)
+        """First hits through the centres of all pixels, each field (H, W)."""
+        shape = (self._scene.camera.height, self._scene.camera.width)
+        rows, columns = np.indices(shape).reshape(2, -1)
+        hits = self.cast(eye, time_frames, rows, columns)
+        return Hits(
+            hits.disparity.reshape(shape), hits.object_index.reshape(shape), hits.occlusion.reshape(shape)
+        )
 
     def surface_points(
         self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
@@ -83,12 +87,12 @@ class SceneRayCaster:
         """What is seen through the centres of the pixels (rows, columns), both (N,)."""
         directions = self._directions(rows, columns)
         triangle, weights = np.full(len(directions), -1, np.int64), np.zeros((len(directions), 3))
-        if len(self._geometry.triangles):
+        if len(self.geometry.triangles):
             self._place(time_frames)
             own, _ = self._eyes(eye)
             triangle = self._nearest(own, directions)
             met = triangle >= 0
-            a, b, c = np.moveaxis(self._vertices[self._geometry.triangles[triangle[met]]] - own, 1, 0)
+            a, b, c = np.moveaxis(self._vertices[self.geometry.triangles[triangle[met]]] - own, 1, 0)
             ray = directions[met]
             # Of a ray r from the origin through a triangle a, b, c: det(r, b, c) and its rotations.
             parts = [np.einsum("ij,ij->i", ray, np.cross(*pair)) for pair in ((b, c), (c, a), (a, b))]
@@ -104,7 +108,7 @@ class SceneRayCaster:
             self._directions(rows, columns),
         )
         back = points.triangle >= 0
-        a, b, c = np.moveaxis(self._vertices[self._geometry.triangles[points.triangle[back]]], 1, 0)
+        a, b, c = np.moveaxis(self._vertices[self.geometry.triangles[points.triangle[back]]], 1, 0)
         back[back] = np.einsum("ij,ij->i", np.cross(b - a, c - a), directions[back]) > 0
         return back
 
@@ -127,14 +131,14 @@ class SceneRayCaster:
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         hit = self._nearest(origin, directions)
         met = hit >= 0
-        corners = self._vertices[self._geometry.triangles[hit[met]]] - origin
+        corners = self._vertices[self.geometry.triangles[hit[met]]] - origin
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # depth = n.v / n.r with a ray r of unit length along the axis, and disparity = fB / depth.
         along = np.einsum("ij,ij->i", normals, directions[met])
         disparity, index = np.zeros(len(hit)), np.zeros(len(hit), np.int64)
         distance = np.einsum("ij,ij->i", normals, corners[:, 0])
         disparity[met] = self._scene.camera.disparity_metres * along / distance
-        index[met] = 1 + self._geometry.owners[hit[met]]
+        index[met] = 1 + self.geometry.owners[hit[met]]
         return disparity, index
 
     def _hidden(
@@ -170,7 +174,7 @@ class SceneRayCaster:
         if time_frames == self._instant:
             return
         to_left_eye = np.linalg.inv(self._scene.camera.pose("left", time_frames))
-        self._vertices = self._geometry.vertices(time_frames, to_left_eye)
+        self._vertices = self.geometry.vertices(time_frames, to_left_eye)
         self._embree = EmbreeScene(robust=True)
-        TriangleMesh(self._embree, self._vertices.astype(np.float32), self._geometry.triangles)
+        TriangleMesh(self._embree, self._vertices.astype(np.float32), self.geometry.triangles)
         self._instant = time_frames

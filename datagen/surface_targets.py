@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from datagen.layout import DIRECTIONS, Direction, Eye
 from datagen.raycast import SceneRayCaster
-from datagen.scene_geometry import SceneGeometry
 
 STEP: dict[Direction, int] = {"into_future": 1, "into_past": -1}
 """Frames from a pixel's instant to the one its point is followed to."""
@@ -26,17 +25,28 @@ BOUNDARY_PIXELS = 10
 
 
 class PixelSurfaces:
-    """What every pixel of one eye sees at one instant, ready to be followed to other instants."""
+    """What some pixels of one eye see at one instant, ready to be followed to other instants.
 
-    def __init__(self, caster: SceneRayCaster, geometry: SceneGeometry, eye: Eye, time_frames: float) -> None:
-        self._geometry, self._eye, self._time = geometry, eye, time_frames
-        camera = geometry.scene.camera
-        self._shape = (camera.height, camera.width)
-        rows, columns = (grid.ravel() for grid in np.indices(self._shape))
+    The pixels are rows and columns of one shape S, which may be the whole image's or a list's; what the methods give
+    has that shape too.
+    """
+
+    def __init__(
+        self,
+        caster: SceneRayCaster,
+        eye: Eye,
+        time_frames: float,
+        rows: NDArray[np.intp],
+        columns: NDArray[np.intp],
+    ) -> None:
+        self._geometry, self._eye, self._time = caster.geometry, eye, time_frames
+        camera = caster.geometry.scene.camera
+        self._shape = rows.shape
+        rows, columns = rows.ravel(), columns.ravel()
         points = caster.surface_points(eye, time_frames, rows, columns)
         self._met = points.triangle >= 0
-        self._corners = geometry.triangles[points.triangle[self._met]]
-        self._owners = geometry.owners[points.triangle[self._met]]
+        self._corners = self._geometry.triangles[points.triangle[self._met]]
+        self._owners = self._geometry.owners[points.triangle[self._met]]
         self._weights = points.weights[self._met]
         self._centres = np.stack([columns, rows], -1) + 0.5
         x, y = ((self._centres - (camera.width / 2, camera.height / 2)) / camera.focal_px).T
@@ -44,12 +54,12 @@ class PixelSurfaces:
         """Directions through the pixels' centres in the camera's frame (x right, y up, looking along -z)."""
 
     def materials(self) -> NDArray[np.uint16]:
-        """(H, W) 0 for the sky, else 1 + the index in `Scene.materials`."""
+        """(*S,) 0 for the sky, else 1 + the index in `Scene.materials`."""
         worn = np.array([thing.material for thing in self._geometry.scene.objects])
         return self._picture(1.0 + worn[self._owners], np.zeros(len(self._met))).astype(np.uint16)
 
     def normals(self) -> NDArray[np.float32]:
-        """(H, W, 3) unit normals of the triangles in the camera's frame, towards the eye; 0 for the sky."""
+        """(*S, 3) unit normals of the triangles in the camera's frame, towards the eye; 0 for the sky."""
         a, b, c = np.moveaxis(self._seen_from(self._time)[self._corners], 1, 0)
         normals = np.cross(b - a, c - a)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -58,7 +68,7 @@ class PixelSurfaces:
         return self._picture(normals, np.zeros((len(self._met), 3)))
 
     def flow(self, direction: Direction) -> NDArray[np.float32]:
-        """(H, W, 2) displacement [to the right, down] in px to where the point is seen one frame on.
+        """(*S, 2) displacement [to the right, down] in px to where the point is seen one frame on.
 
         NaN for points that will be behind the camera. The sky moves with the camera's rotation only.
         """
@@ -74,27 +84,12 @@ class PixelSurfaces:
         return (seen - self._centres).reshape(*self._shape, 2).astype(np.float32)
 
     def disparity_change(self, direction: Direction) -> NDArray[np.float32]:
-        """(H, W) px by which the point's disparity grows until one frame on; NaN behind the camera, sky 0."""
+        """(*S,) px by which the point's disparity grows until one frame on; NaN behind the camera, sky 0."""
         fb = self._geometry.scene.camera.disparity_metres
         now, then = (-self._points_at(time)[:, 2] for time in (self._time, self._time + STEP[direction]))
         with np.errstate(divide="ignore"):
             change = np.where(then > 0, fb / then - fb / now, np.nan)
         return self._picture(change, np.zeros(len(self._met)))
-
-    def motion_boundaries(self, flow: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """(H, W) where two objects meet that move differently, by the (H, W, 2) flow of one direction."""
-        objects = self._picture(self._owners + 1.0, np.zeros(len(self._met)))
-        marked = np.zeros(self._shape, bool)
-        for axis in (0, 1):
-            first = tuple(slice(0, -1) if k == axis else slice(None) for k in (0, 1))
-            second = tuple(slice(1, None) if k == axis else slice(None) for k in (0, 1))
-            step = np.linalg.norm(flow[first] - flow[second], axis=-1)
-            meets = (objects[first] != objects[second]) & (step >= BOUNDARY_STEP_PX)
-            marked[first] |= meets
-            marked[second] |= meets
-        _, labels, statistics, _ = cv2.connectedComponentsWithStats(marked.astype(np.uint8), connectivity=8)
-        large = statistics[:, cv2.CC_STAT_AREA] >= BOUNDARY_PIXELS
-        return marked & large[labels]
 
     def _seen_from(self, time_frames: float) -> NDArray[np.float64]:
         """(V, 3) all vertices at an instant in this eye's frame of that instant."""
@@ -113,19 +108,37 @@ class PixelSurfaces:
         return picture.reshape(*self._shape, *sky.shape[1:]).astype(np.float32)
 
 
+def motion_boundaries(flow: NDArray[np.float32], object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
+    """(H, W) where two objects meet that move differently, by the (H, W, 2) flow of one direction."""
+    marked = np.zeros(object_index.shape, bool)
+    for axis in (0, 1):
+        first = tuple(slice(0, -1) if k == axis else slice(None) for k in (0, 1))
+        second = tuple(slice(1, None) if k == axis else slice(None) for k in (0, 1))
+        step = np.linalg.norm(flow[first] - flow[second], axis=-1)
+        meets = (object_index[first] != object_index[second]) & (step >= BOUNDARY_STEP_PX)
+        marked[first] |= meets
+        marked[second] |= meets
+    _, labels, statistics, _ = cv2.connectedComponentsWithStats(marked.astype(np.uint8), connectivity=8)
+    large = statistics[:, cv2.CC_STAT_AREA] >= BOUNDARY_PIXELS
+    return marked & large[labels]
+
+
 class ExtraTargets:
     """Makes the targets a recipe asks for besides the basic ones."""
 
-    def __init__(self, geometry: SceneGeometry, caster: SceneRayCaster, kinds: tuple[str, ...]) -> None:
+    def __init__(self, caster: SceneRayCaster, kinds: tuple[str, ...]) -> None:
         """kinds: among `datagen.layout.EXTRA_TARGETS`."""
-        self._geometry, self._caster, self._kinds = geometry, caster, kinds
+        self._caster, self._kinds = caster, kinds
 
-    def make(self, eye: Eye, frame: int) -> dict[tuple[str, Direction | None], NDArray[Any]]:
-        """The arrays of one eye and frame, by kind and direction."""
+    def make(
+        self, eye: Eye, frame: int, object_index: NDArray[np.integer[Any]]
+    ) -> dict[tuple[str, Direction | None], NDArray[Any]]:
+        """The arrays of one eye and frame, by kind and direction. object_index: (H, W), the frame's."""
         made: dict[tuple[str, Direction | None], NDArray[Any]] = {}
         if not self._kinds:
             return made
-        surfaces = PixelSurfaces(self._caster, self._geometry, eye, frame)
+        pixels = np.indices(object_index.shape)
+        surfaces = PixelSurfaces(self._caster, eye, frame, pixels[0], pixels[1])
         if "material_index" in self._kinds:
             made["material_index", None] = surfaces.materials()
         if "normals" in self._kinds:
@@ -137,5 +150,5 @@ class ExtraTargets:
             if "optical_flow" in self._kinds:
                 made["optical_flow", direction] = flow
             if "motion_boundaries" in self._kinds:
-                made["motion_boundaries", direction] = surfaces.motion_boundaries(flow)
+                made["motion_boundaries", direction] = motion_boundaries(flow, object_index)
         return made

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +15,10 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
 from datagen import DatasetError, Recipe, StereoDataset, StereoSample, render_dataset
+from datagen.formats import write_flow, write_mask, write_normals, write_pfm, write_png
 from datagen.gallery import write_gallery
-from datagen.layout import DIRECTIONS, EXTRA_TARGETS, EYES, Direction, Eye
+from datagen.layout import DIRECTIONS, EXTRA_TARGETS, EYES, Direction, Eye, Layout
+from datagen.manifest import file_entry, read_manifest, write_manifest
 from datagen.raycast import SceneRayCaster
 from datagen.scene_geometry import SceneGeometry
 from datagen.surface_targets import STEP, PixelSurfaces
@@ -133,7 +138,8 @@ def plane_seen(
 
 def surfaces(scene: Scene, eye: Eye, time: float = NOW) -> PixelSurfaces:
     geometry = SceneGeometry(scene)
-    return PixelSurfaces(SceneRayCaster(geometry), geometry, eye, time)
+    rows, columns = np.indices((scene.camera.height, scene.camera.width))
+    return PixelSurfaces(SceneRayCaster(geometry), eye, time, rows, columns)
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
@@ -276,6 +282,44 @@ def test_all_targets_are_there_and_agree_among_themselves(dataset: Path) -> None
                     touching |= shifted != view.object_index
                 assert (touching[marked]).mean() > 0.99
                 assert np.isfinite(flow).all()
+
+
+def commit_again(root: Path) -> None:
+    """Make the manifest say what the files are now."""
+    layout = Layout(root)
+    path = layout.manifest("train", 0)
+    manifest = read_manifest(path)
+    write_manifest(
+        path, replace(manifest, files=tuple(file_entry(root, root / f.path) for f in manifest.files))
+    )
+
+
+def test_verify_finds_targets_that_are_not_of_the_scene(dataset: Path, tmp_path: Path) -> None:
+    """Files that are whole and well-formed, but say something wrong."""
+    root = Path(shutil.copytree(dataset, tmp_path / "set"))
+    sample, layout = StereoDataset(root, "train")[0], Layout(root)
+    turned = sample.normals("left") * np.float32([1, -1, 1])
+    mistakes: list[tuple[str, Direction | None, Callable[[Path, Any], None], Any]] = [
+        ("material_index", None, write_png, sample.material_index("right")),
+        ("normals", None, write_normals, turned),
+        ("optical_flow", "into_future", write_flow, sample.flow("left", "into_future") + np.float32(0.5)),
+        ("optical_flow", "into_past", write_flow, -sample.flow("left", "into_past")),
+        ("disparity_change", "into_future", write_pfm, sample.disparity_change("left", "into_past")),
+        ("motion_boundaries", "into_past", write_mask, ~sample.motion_boundaries("left", "into_past")),
+    ]
+    for kind, direction, write, values in mistakes:
+        path = layout.file(kind, "train", 0, "left", sample.frame, direction)
+        good = path.read_bytes()
+        write(path, values)
+        commit_again(root)
+        problems = verify_dataset(root, workers=1).problems
+        assert problems, kind
+        # Motion boundaries follow from the flow, so a wrong flow is seen in them too.
+        alike = (kind, "motion_boundaries") if kind == "optical_flow" else (kind,)
+        assert all(any(k in str(problem) for k in alike) for problem in problems)
+        path.write_bytes(good)
+    commit_again(root)
+    assert verify_dataset(root, workers=1).problems == ()
 
 
 def test_flow_loaders_find_the_published_names(dataset: Path) -> None:
