@@ -21,7 +21,7 @@ from datagen.formats import (
     read_pfm,
     read_png,
 )
-from datagen.formats.limits import read_bounded
+from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.png import read_png_size
 from datagen.layout import EYES, RENDER_PASSES, SPLITS, Direction, Eye, Layout
 from datagen.manifest import read_manifest
@@ -289,7 +289,10 @@ class StereoDataset(Sequence[StereoSample]):
         folder = self.layout.scene_folder(RENDER_PASSES[self.render_pass], self.split, scene) / "left"
         prefix = f"{self.layout.relative(folder)}/"
         names = (entry.path for entry in read_manifest(self.layout.local(manifest)).files)
-        frames = sorted(int(Path(name).stem) for name in names if name.startswith(prefix))
+        numbers = [Path(name).stem for name in names if name.startswith(prefix)]
+        if not all(number.isascii() and number.isdigit() and len(number) < 10 for number in numbers):
+            raise DatasetError(f"{manifest}: lists a left image whose name is no number")
+        frames = sorted(map(int, numbers))
         if not frames:
             raise DatasetError(f"{manifest}: lists no image of the {self.render_pass} pass")
         return frames
@@ -315,7 +318,7 @@ def read_scene(path: Path) -> Scene:
     """Read a Scene record of a data set. Raises DatasetError for one that is missing or describes no scene."""
     use_store(Layout(path.parents[3]).assets)
     try:
-        return scene_from_json(read_bounded(path).decode("utf-8"))
+        return scene_from_json(read_bounded(path, MAX_JSON_BYTES).decode("utf-8"))
     except DatasetError:
         raise
     except (ValueError, RecursionError) as error:

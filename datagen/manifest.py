@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, TypeVar
 
 from datagen.errors import DatasetError
-from datagen.formats.limits import read_bounded
+from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from storage import write_text
 
 T = TypeVar("T")
@@ -34,7 +34,12 @@ class FileEntry:
 
     def __post_init__(self) -> None:
         parts = PurePosixPath(self.path).parts
-        if not parts or self.path.startswith("/") or ".." in parts or re.search(r"[\\:\0]", self.path):
+        if (
+            not parts
+            or self.path.startswith("/")
+            or ".." in parts
+            or re.search(r"[\\:\x00-\x1f\x7f]", self.path)
+        ):
             raise DatasetError(f"a manifest's path must stay below the data set's folder, got {self.path!r}")
         if self.size < 0 or not _SHA256.fullmatch(self.sha256):
             raise DatasetError(f"{self.path}: {self.size} bytes with SHA-256 {self.sha256!r} cannot be")
@@ -80,7 +85,7 @@ def seal(record: dict[str, Any]) -> str:
 def read_manifest(path: Path) -> SceneManifest:
     """Read a manifest. Raises DatasetError with one sentence for a file that is not one."""
     try:
-        content = read_bounded(path)
+        content = read_bounded(path, MAX_JSON_BYTES)
         data = json.loads(content)
         digest = data.pop(_OWN_DIGEST, None)
         files = tuple(_typed(FileEntry, _FILE_TYPES, entry) for entry in _as_list(data.pop("files")))
@@ -94,7 +99,9 @@ def read_manifest(path: Path) -> SceneManifest:
 
 
 def _check_seal(content: bytes, digest: Any) -> None:
-    plain = content.replace(str(digest).encode(), _NO_DIGEST.encode())
+    if not isinstance(digest, str) or not _SHA256.fullmatch(digest):
+        raise DatasetError(f"does not carry its own SHA-256 but {str(digest)[:80]!r}")
+    plain = content.replace(digest.encode(), _NO_DIGEST.encode())
     if hashlib.sha256(plain).hexdigest() != digest:
         raise DatasetError("is damaged, its SHA-256 is not the one it carries")
 

@@ -82,8 +82,11 @@ def read_quarantined(tree: Tree, split: str, scene: int) -> QuarantinedScene:
     """Raises DatasetError for an entry that is missing or damaged."""
     name = _entry_name(split, scene)
     try:
-        return QuarantinedScene(**json.loads(tree.read(name)))
-    except (OSError, ValueError, TypeError) as error:
+        entry = QuarantinedScene(**json.loads(tree.read(name)))
+        if (entry.split, entry.scene) != (split, scene):
+            raise ValueError("it is another scene's")
+        return entry
+    except (OSError, ValueError, TypeError, RecursionError) as error:
         raise DatasetError(f"{tree.name}/{name}: is not an entry of the quarantine ({error})") from error
 
 

@@ -13,6 +13,7 @@ import yaml
 
 from datagen.curation import Curation
 from datagen.errors import DatasetError
+from datagen.formats.limits import read_bounded
 from datagen.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
 from scenes.assets import AssetPool
@@ -129,13 +130,9 @@ def _check_shape(text: str) -> None:
 
 def read_recipe(path: Path) -> Recipe:
     """Raises DatasetError for a file that is missing, no YAML, or no recipe."""
-    try:
-        text = path.read_bytes()
-    except FileNotFoundError as error:
-        raise DatasetError(f"there is no recipe {path}") from error
-    except OSError as error:
-        raise DatasetError(f"cannot read the recipe {path}: {error.strerror}") from error
-    return recipe_from_text(text, str(path))
+    if not path.exists():
+        raise DatasetError(f"there is no recipe {path}")
+    return recipe_from_text(read_bounded(path, MAX_RECIPE_BYTES), str(path))
 
 
 def recipe_to_text(recipe: Recipe) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,7 +37,8 @@ class Problem:
     """The scene to render again; None where no scene is to blame."""
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.message}"
+        place = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in self.place)
+        return f"{place}: {self.message}"
 
 
 @dataclass
@@ -102,6 +104,8 @@ class SceneCheck:
         path = self.layout.root / entry.path
         self.files += 1
         try:
+            if path.exists() and not path.is_file():  # A pipe or a device would be read without end.
+                raise OSError(errno.EINVAL, "it is no regular file")
             with self.layout.local(path).open("rb") as file:
                 digest = hashlib.file_digest(file, "sha256").hexdigest()
                 size = file.tell()

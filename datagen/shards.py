@@ -7,6 +7,7 @@ its samples is asked for, and read from there ever after.
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import tarfile
 from collections.abc import Sequence
@@ -22,6 +23,7 @@ from storage import replacing
 
 CACHE_VARIABLE = "STEREOFORGE_CACHE"
 _INDICES_KEPT = 4096
+_MAX_HEADER_BYTES = 1 << 20
 
 
 class Extent(NamedTuple):
@@ -59,21 +61,31 @@ def read_sample_member(shard: str, key: str, member: str) -> bytes | None:
         raise FormatError(f"{path}: cannot be read: {error.strerror}") from error
 
 
+class _HeaderFile(io.FileIO):
+    """A file in which tarfile finds headers: it would ask for, and allocate, whatever one of them declares."""
+
+    def read(self, size: int = -1, /) -> bytes:
+        if not 0 <= size <= _MAX_HEADER_BYTES:
+            raise tarfile.ReadError(f"a header declares {size} bytes of names")
+        return super().read(size) or b""
+
+
 @lru_cache(maxsize=_INDICES_KEPT)
 def shard_index(path: Path) -> ShardIndex:
     """What a shard holds, from its headers alone. Raises FormatError for a damaged shard."""
     index: ShardIndex = {}
-    size = path.stat().st_size
     try:
-        with tarfile.open(path, "r:") as shard:
+        with _HeaderFile(path) as file, tarfile.open(fileobj=file, mode="r:") as shard:
+            size = os.fstat(file.fileno()).st_size
             for entry in shard:
                 if not entry.isfile():
                     continue
-                if entry.size > MAX_FILE_BYTES or entry.offset_data + entry.size > size:
-                    raise FormatError(f"{path}: is cut off, or its member {entry.name} is too large")
+                bounded = 0 <= entry.size <= min(MAX_FILE_BYTES, size - entry.offset_data)
+                if not bounded or entry.issparse():
+                    raise FormatError(f"{path}: is cut off, or its member {entry.name!r} is not a plain file")
                 key, _, member = entry.name.rpartition("/")[2].partition(".")
                 index.setdefault(key, {})[member] = Extent(entry.offset_data, entry.size)
-    except (tarfile.TarError, OSError, ValueError) as error:
+    except (tarfile.TarError, OSError, ValueError, ArithmeticError, RecursionError) as error:
         if isinstance(error, FormatError):
             raise
         raise FormatError(f"{path}: is not an intact tar file ({error})") from error

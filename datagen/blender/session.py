@@ -56,10 +56,23 @@ def start_empty_file(settings: CyclesSettings) -> bpy.types.Scene:
     Starting from factory settings each time is what keeps the memory of a long-lived worker flat.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    _remove_temporary_folder()
     scene = bpy.context.scene
     _configure_cycles(scene, settings)
     _configure_output(scene)
     return scene
+
+
+def _remove_temporary_folder() -> None:
+    """Remove the folder that Blender makes at each start, and that a killed worker would leave in /tmp.
+
+    Nothing here puts anything into it; Blender itself does not mind that it is gone.
+    """
+    with contextlib.suppress(OSError):
+        Path(bpy.app.tempdir).rmdir()
+
+
+_remove_temporary_folder()
 
 
 def _configure_cycles(scene: bpy.types.Scene, settings: CyclesSettings) -> None:

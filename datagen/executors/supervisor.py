@@ -11,8 +11,12 @@ from typing import Any
 from datagen.executors.base import Failure, Outcome
 from workers import Limits, WorkerError, WorkerProcess
 
-MAX_KILLS = 10
-"""Being killed from outside is not the job's fault, but a machine without memory does that too."""
+MAX_KILLS = 30
+"""Being killed from outside is not the job's fault, but a machine without memory does that too.
+
+With workers killed every few seconds on a busy machine, where a new one takes ten to come up, one job in twenty
+was killed ten times in a row.
+"""
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from pathlib import Path
 
 from datagen.errors import FormatError
@@ -9,17 +11,27 @@ from datagen.errors import FormatError
 MAX_ELEMENTS = 2**28
 """Most numbers an array may have, 1 GiB of float32: a header that promises more is damage, not data."""
 MAX_FILE_BYTES = 2**31
+MAX_JSON_BYTES = 2**25
+"""Parsed, JSON takes up to twenty times its size; no record of a data set comes near this."""
 
 
-def read_bounded(path: Path) -> bytes:
-    """The whole content of a file. Raises FormatError if it cannot be read or is beyond any image's size."""
+def read_bounded(path: Path, most_bytes: int = MAX_FILE_BYTES) -> bytes:
+    """The whole content of a file. Raises FormatError if it cannot be read, is no file, or is larger than that."""
     try:
-        size = path.stat().st_size
-        if size > MAX_FILE_BYTES:
-            raise FormatError(f"{path}: {size} bytes are more than any file of a data set has")
+        size = require_regular(path).st_size
+        if size > most_bytes:
+            raise FormatError(f"{path}: {size} bytes are more than any such file of a data set has")
         return path.read_bytes()
     except OSError as error:
         raise FormatError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def require_regular(path: Path) -> os.stat_result:
+    """The file's status. Raises FormatError for a pipe or a device, which would be read without end, and OSError."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise FormatError(f"{path}: cannot be read: it is no regular file")
+    return status
 
 
 def check_image_size(origin: Path | str, width: int, height: int, channels: int) -> None:

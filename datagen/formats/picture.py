@@ -18,6 +18,8 @@ from datagen.formats.png import read_png
 _PNM_HEADER = re.compile(rb"P([56])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})\s+(\d{1,5})\s")
 _JPEG_STANDALONE = {0x01, *range(0xD0, 0xD8)}
 _JPEG_FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
+_MOST_JPEG_SEGMENTS = 100_000
+"""Bytes that fill count as one each."""
 _JPEG_END = b"\xff\xd9"
 
 
@@ -51,6 +53,8 @@ def read_pnm(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
     channels = 1 if header[1] == b"5" else 3
     width, height, largest = int(header[2]), int(header[3]), int(header[4])
     check_image_size(path, width, height, channels)
+    if not 0 < largest < 2**16:
+        raise FormatError(f"{path}: its header declares {largest} as the largest value, not 1 to 65535")
     kind = np.dtype("u1") if largest < 256 else np.dtype(">u2")
     expected = header.end() + width * height * channels * kind.itemsize
     if len(data) != expected:
@@ -78,7 +82,9 @@ def _jpeg_size(path: Path, data: bytes) -> tuple[int, int]:
     position = 2
     if not data.startswith(b"\xff\xd8"):
         raise FormatError(f"{path}: is not a JPEG file")
-    while position + 9 <= len(data) and data[position] == 0xFF:
+    segments = 0
+    while position + 9 <= len(data) and data[position] == 0xFF and segments < _MOST_JPEG_SEGMENTS:
+        segments += 1
         marker = data[position + 1]
         if marker in _JPEG_FRAMES:
             height, width = struct.unpack_from(">HH", data, position + 5)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
-from datagen.formats.limits import check_image_size, read_bounded
+from datagen.formats.limits import check_image_size, read_bounded, require_regular
 from storage import write_bytes
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -43,6 +43,7 @@ def read_png_size(path: Path | str) -> tuple[int, int]:
     """(height, width) from a PNG's header alone. Raises FormatError."""
     path = Path(path)
     try:
+        require_regular(path)
         with path.open("rb") as file:
             start = file.read(len(_SIGNATURE) + 16)
     except OSError as error:

@@ -100,7 +100,7 @@ def _read_index(location: str) -> dict[str, list[str]] | None:
             for name, keys in shards.items()
         ):
             raise ValueError("a shard's name or its list of samples is not as it should be")
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FormatError(f"{url}: is not an index of shards ({error})") from error
     return dict(shards)
 

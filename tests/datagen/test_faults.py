@@ -140,7 +140,8 @@ def children_of(pid: int) -> list[int]:
 
 @pytest.mark.slow
 def test_ctrl_c_leaves_whole_scenes_and_nothing_else(small_reference: Path, tmp_path: Path) -> None:
-    root = tmp_path / "set"
+    root, temporary = tmp_path / "set", tmp_path / "temporary"
+    temporary.mkdir()
     write_recipe(tmp_path / "recipe.yaml", RECIPE)
     command = [sys.executable, "-m", "stereoforge", "render", "--recipe", str(tmp_path / "recipe.yaml")]
     process = subprocess.Popen(
@@ -148,6 +149,7 @@ def test_ctrl_c_leaves_whole_scenes_and_nothing_else(small_reference: Path, tmp_
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        env={**os.environ, "TMPDIR": str(temporary)},
     )
     deadline = time.monotonic() + 300
     while not list(root.glob("manifest/TRAIN/A/*.json")) and time.monotonic() < deadline:
@@ -162,6 +164,7 @@ def test_ctrl_c_leaves_whole_scenes_and_nothing_else(small_reference: Path, tmp_
     while any(Path(f"/proc/{pid}").exists() for pid in workers) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert not [pid for pid in workers if Path(f"/proc/{pid}").exists()]
+    assert list(temporary.iterdir()) == []
     assert not (root / STAGING_FOLDER).exists()
     done = hashes(root)
     assert done.items() <= hashes(small_reference).items()

@@ -54,7 +54,7 @@ def test_faults_cost_what_they_cost_locally(cluster: Cluster, tmp_path: Path) ->
         "fine": ("fine done", None, 1),
         "raise": (None, "exception", 1),
         "crash": (None, "crash", 2),
-        "be killed often": ("be killed often done", None, 4),
+        "be killed often": ("be killed often done", None, 12),
         "hang": (None, "timeout", 2),
     }
     failure = outcomes["crash"].failure
