@@ -64,8 +64,8 @@ def read_sample_member(shard: str, key: str, member: str) -> bytes | None:
 class _HeaderFile(io.FileIO):
     """A file in which tarfile finds headers: it would ask for, and allocate, whatever one of them declares."""
 
-    def read(self, size: int = -1, /) -> bytes:
-        if not 0 <= size <= _MAX_HEADER_BYTES:
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is None or not 0 <= size <= _MAX_HEADER_BYTES:
             raise tarfile.ReadError(f"a header declares {size} bytes of names")
         return super().read(size) or b""
 
