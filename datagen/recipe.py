@@ -74,7 +74,7 @@ class Recipe:
         if self.curriculum_scenes < 0:
             raise DatasetError(f"curriculum_scenes must not be negative, got {self.curriculum_scenes}")
         try:
-            self.world.with_assets(self.assets).at_complexity(0.0 if self.curriculum_scenes else 1.0)
+            self.world.at_complexity(0.0 if self.curriculum_scenes else 1.0)
         except ValueError as error:
             raise DatasetError(str(error)) from error
         if self.seed < 0:
@@ -93,10 +93,10 @@ class Recipe:
         """The index-th scene of a split; splits, scenes and attempts draw from unrelated random streams."""
         key = (SPLITS.index(split), index) + ((attempt,) if attempt else ())
         sequence = np.random.SeedSequence(self.seed, spawn_key=key)
-        world = self.world.with_assets(self.assets.of_split(split))
+        world = self.world
         if index < self.curriculum_scenes:
             world = world.at_complexity(index / self.curriculum_scenes)
-        return sample_scene(np.random.default_rng(sequence), self.family, world)
+        return sample_scene(np.random.default_rng(sequence), self.family, world, self.assets.of_split(split))
 
 
 def recipe_from_plain(data: Any, origin: str) -> Recipe:

@@ -5,15 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 import scenes.families
+from scenes.assets import AssetPool
 from scenes.discovery import modules_in
 from scenes.family import Family, FamilyConfig
+from scenes.own_content import with_own_content
 from scenes.spec import Scene
 
 FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in modules_in(scenes.families)}
 
 
-def sample_scene(rng: np.random.Generator, family: str, config: FamilyConfig | None = None) -> Scene:
-    """Draw a random scene of a family.
+def sample_scene(
+    rng: np.random.Generator, family: str, config: FamilyConfig | None = None, assets: AssetPool | None = None
+) -> Scene:
+    """Draw a random scene of a family, of the user's own files too if there are `assets`.
 
     The same generator state, family and config give the same scene on any machine. Raises ValueError for
     a family that does not exist or a config of another family.
@@ -24,4 +28,6 @@ def sample_scene(rng: np.random.Generator, family: str, config: FamilyConfig | N
     config = kind.config() if config is None else config
     if not isinstance(config, kind.config):
         raise ValueError(f"{family} takes a {kind.config.__name__}, not a {type(config).__name__}")
-    return kind.sample(rng, config)
+    assets = AssetPool() if assets is None else assets
+    scene = kind.sample(rng, config.with_assets(assets))
+    return with_own_content(rng, scene, assets, kind.replaceable) if kind.replaceable else scene

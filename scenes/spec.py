@@ -125,14 +125,20 @@ class Trajectory:
         rotations = Rotation.from_quat([(x, y, z, w) for w, x, y, z in self.rotations])
         return CubicSpline(self.times_frames, self.positions_m), RotationSpline(self.times_frames, rotations)
 
+    @cached_property
+    def _resting(self) -> NDArray[np.float64]:
+        """The only pose of what does not move; most things, and asked for many times."""
+        pose = np.eye(4)
+        w, x, y, z = self.rotations[0]
+        pose[:3, :3] = Rotation.from_quat((x, y, z, w)).as_matrix()
+        pose[:3, 3] = self.positions_m[0]
+        return pose
+
     def pose(self, time_frames: float) -> NDArray[np.float64]:
         """The (4, 4) local-to-world matrix at an instant; held at the ends outside the key times."""
-        pose = np.eye(4)
         if len(self.times_frames) == 1:
-            w, x, y, z = self.rotations[0]
-            pose[:3, :3] = Rotation.from_quat((x, y, z, w)).as_matrix()
-            pose[:3, 3] = self.positions_m[0]
-            return pose
+            return self._resting.copy()
+        pose = np.eye(4)
         time = float(np.clip(time_frames, self.times_frames[0], self.times_frames[-1]))
         positions, rotations = self._splines
         pose[:3, :3] = rotations(time).as_matrix()

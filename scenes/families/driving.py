@@ -14,6 +14,7 @@ import numpy as np
 
 from scenes.drawing import chance, choose, uniform
 from scenes.family import Family
+from scenes.own_content import Replaceable
 from scenes.spec import Light, Scene
 from scenes.streets.assembly import Assembly
 from scenes.streets.clearance import keep_clear
@@ -99,4 +100,8 @@ def _sample_sides(rng: np.random.Generator, config: DrivingConfig, drive: Drive)
     return sides[0], sides[1]
 
 
-FAMILY = Family(name="driving", config=DrivingConfig, sample=sample_driving)
+_REPLACEABLE = Replaceable(
+    props=r"(bin|bench|cabinet|bollard) .*|shrub .*", painted=r"house .* walls|block .*|fence .*"
+)
+
+FAMILY = Family("driving", DrivingConfig, sample_driving, _REPLACEABLE)

@@ -27,6 +27,7 @@ from scenes.outdoors import (
     sample_final,
     sample_focus,
 )
+from scenes.own_content import Replaceable
 from scenes.planting import Garden, anywhere, boulders, grass, mushrooms, plants, trees, undergrowth
 from scenes.shapes.landforms import Cavern, Dripstone, Landscape
 from scenes.shapes.plants import Bush, Palm, Tree, Vine
@@ -42,6 +43,8 @@ PLACES = ("jungle", "meadow", "mushrooms", "cave")
 @dataclass(frozen=True)
 class MonkaaConfig(LandscapeConfig):
     """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+
+    crowd = ("creatures", "fur_locks", "undergrowth", "grass_tufts", "trees", "boulders")
 
     creatures: Count = (1, 4)
     """Creatures per scene; the first is what the scene is about."""
@@ -352,4 +355,6 @@ def _cave_lamp(rng: np.random.Generator, plan: _Plan, cave: _Tunnel, index: int)
     )
 
 
-FAMILY = Family(name="monkaa", config=MonkaaConfig, sample=sample_monkaa)
+_REPLACEABLE = Replaceable(props=r"boulder .*", painted=r"ground|cave|(boulder|giant|toadstool) .*")
+
+FAMILY = Family("monkaa", MonkaaConfig, sample_monkaa, _REPLACEABLE)

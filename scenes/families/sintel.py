@@ -29,6 +29,7 @@ from scenes.outdoors import (
     sample_final,
     sample_focus,
 )
+from scenes.own_content import Replaceable
 from scenes.planting import Garden, boulders, grass, plants, trees, undergrowth
 from scenes.shapes.landforms import Landscape
 from scenes.shapes.masonry import Archway, BlockWall, Column, House, Steps
@@ -59,6 +60,8 @@ PERSON_M = 1.75
 @dataclass(frozen=True)
 class SintelConfig(LandscapeConfig):
     """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+
+    crowd = ("people", "trees", "structures", "boulders", "plants")
 
     focal_mm: Range = (26.0, 60.0)
     """Focal length on a sensor 32 mm wide."""
@@ -439,4 +442,8 @@ _PLACES: dict[str, _Place] = {
     "town": _Place(0.16, paving, rock(ROCK, EARTH), (0.03, 0.16), (0.3, 0.9), (0.2, 0.4), 0.25, _town),
 }
 
-FAMILY = Family(name="sintel", config=SintelConfig, sample=sample_sintel)
+_REPLACEABLE = Replaceable(
+    props=r"(rock|crag) .*", painted=r"ground|(rock|crag|column|ruin) .*|house .* walls"
+)
+
+FAMILY = Family("sintel", SintelConfig, sample_sintel, _REPLACEABLE)

@@ -15,6 +15,9 @@ Count = tuple[int, int]
 class DrivingConfig(FamilyConfig):
     """Ranges are drawn from uniformly, once a scene or once a thing as the words say."""
 
+    crowd = ("parked_share", "pedestrians_per_100m", "furniture_per_100m")
+    sparsity = ("headway_m", "tree_spacing_m", "lamp_spacing_m")
+
     focal_lengths_mm: tuple[float, ...] = (15.0, 35.0)
     """Focal lengths to choose from, on a sensor 32 mm wide."""
     baseline_m: Range = (0.5, 1.0)

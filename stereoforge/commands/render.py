@@ -80,7 +80,7 @@ class Render:
     recipe: Annotated[Path | None, shown("FILE", "none")] = None
     """A recipe.yaml to render."""
     meshes: Annotated[Path | None, shown("DIR", "none")] = None
-    """Your own OBJ, PLY, GLB and STL files, to fly among the generated things; each is used in one split only."""
+    """Your own OBJ, PLY, GLB and STL files, for things among the generated ones; each is used in one split only."""
     textures: Annotated[Path | None, shown("DIR", "none")] = None
     """Your own pictures, to paint things with."""
     environments: Annotated[Path | None, shown("DIR", "none")] = None

@@ -110,11 +110,34 @@ def test_scenes_of_a_split_use_that_split_s_files(imported: ImportedAssets) -> N
     assert Recipe(config, {"train": 1}).sample("train", 0).objects
 
 
-def test_unknown_families_and_folders_are_refused(
-    user: Path, imported: ImportedAssets, tmp_path: Path
+@pytest.mark.parametrize("family", ["driving", "monkaa", "sintel"])
+def test_every_family_takes_the_user_s_files_in_the_place_of_its_own(
+    family: str, imported: ImportedAssets
 ) -> None:
-    with pytest.raises(DatasetError, match="makes no use of own meshes"):
-        Recipe(FAMILIES["driving"].config(), {"train": 1}, assets=imported.pool)
+    recipe = Recipe(FAMILIES[family].config(), {"train": 1})
+    own = Recipe(recipe.world, {"train": 1}, assets=imported.pool)
+    meshes, pictures, changed = set(), set(), 0
+    for index in range(3):
+        before, after = recipe.sample("train", index), own.sample("train", index)
+        assert scene_from_json(scene_to_json(after)) == after
+        pictures |= {m.color.sha256 for m in after.materials if isinstance(m.color, UserTexture)}
+        for old, new in zip(before.objects, after.objects, strict=True):
+            if not isinstance(new.shape, UserMesh):
+                assert new == old
+                continue
+            meshes.add(new.shape.sha256)
+            changed += 1
+            inside, room = (thing.shape.mesh().vertices * thing.scale_m for thing in (new, old))
+            offset = np.linalg.inv(old.motion.pose(0.0)) @ new.motion.pose(0.0)
+            assert (np.abs(inside + offset[:3, 3]).max(axis=0) <= np.abs(room).max(axis=0) + 1e-6).all()
+            assert (inside + offset[:3, 3])[:, 2].min() >= -np.abs(room[:, 2]).max() - 1e-6
+    assert changed > 5
+    assert meshes <= {asset.sha256 for asset in imported.pool.of_split("train").meshes}
+    assert pictures
+    assert pictures <= {asset.sha256 for asset in imported.pool.of_split("train").textures}
+
+
+def test_unknown_folders_and_files_are_refused(user: Path, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="there is no such folder"):
         import_assets(tmp_path / "store", meshes=tmp_path / "nowhere")
     with pytest.raises(DatasetError, match="no usable file"):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
+from datagen import Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.estimate import estimate_run
 from datagen.layout import Layout
 from datagen.manifest import read_manifest
@@ -81,9 +81,19 @@ def test_a_curriculum_goes_from_few_and_plain_to_the_family_s_own() -> None:
     assert scenes[2] == replace(recipe, curriculum_scenes=0).sample("train", 8)
 
 
-def test_a_family_without_simpler_worlds_refuses_a_curriculum() -> None:
-    with pytest.raises(DatasetError, match="no curriculum"):
-        Recipe(FAMILIES["driving"].config(), {"train": 1}, curriculum_scenes=5)
+@pytest.mark.parametrize("family", ["driving", "monkaa", "sintel"])
+def test_every_family_has_a_curriculum_of_more_and_more_things(family: str) -> None:
+    recipe = Recipe(FAMILIES[family].config(), {"train": 6}, curriculum_scenes=6)
+    counts = [len(recipe.sample("train", index).objects) for index in (0, 1, 5, 6)]
+    assert 1.5 * sum(counts[:2]) < sum(counts[2:])
+    assert recipe.sample("train", 6) == replace(recipe, curriculum_scenes=0).sample("train", 6)
+
+
+def test_a_curriculum_never_asks_for_nothing_where_there_was_something() -> None:
+    simple = FAMILIES["monkaa"].config().at_complexity(0.0)
+    assert (simple.creatures, simple.undergrowth) == ((1, 1), (3, 6))
+    with pytest.raises(ValueError, match="from 0 to 1"):
+        simple.at_complexity(1.5)
 
 
 @pytest.mark.parametrize(
