@@ -40,7 +40,8 @@ class Curation:
     min_textured: float = 0.05
     """Share with texture around it, of the rendered picture."""
     disparity_px: tuple[float, float] | None = None
-    """Least and greatest disparity asked for of surfaces; None for whatever the family gives."""
+    """Least and greatest disparity asked for of surfaces, met by choosing depths and baseline; None for whatever
+    the family gives."""
     max_outside: float = 0.02
     """Share of surfaces whose disparity may be outside of that."""
 

@@ -12,6 +12,7 @@ import numpy as np
 import yaml
 
 from datagen.curation import Curation
+from datagen.disparity_range import with_greatest_disparity
 from datagen.errors import DatasetError
 from datagen.formats.limits import read_bounded
 from datagen.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
@@ -75,6 +76,8 @@ class Recipe:
             raise DatasetError(f"curriculum_scenes must not be negative, got {self.curriculum_scenes}")
         try:
             self.world.at_complexity(0.0 if self.curriculum_scenes else 1.0)
+            if self.curation.disparity_px:
+                self.world.within_disparities(*self.curation.disparity_px)
         except ValueError as error:
             raise DatasetError(str(error)) from error
         if self.seed < 0:
@@ -96,7 +99,12 @@ class Recipe:
         world = self.world
         if index < self.curriculum_scenes:
             world = world.at_complexity(index / self.curriculum_scenes)
-        return sample_scene(np.random.default_rng(sequence), self.family, world, self.assets.of_split(split))
+        wanted = self.curation.disparity_px
+        world = world.within_disparities(*wanted) if wanted else world
+        scene = sample_scene(np.random.default_rng(sequence), self.family, world, self.assets.of_split(split))
+        if wanted and not world.depths_for_range:
+            scene = with_greatest_disparity(scene, wanted[1])
+        return scene
 
 
 def recipe_from_plain(data: Any, origin: str) -> Recipe:

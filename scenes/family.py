@@ -25,6 +25,9 @@ class FamilyConfig:
     sparsity: ClassVar[tuple[str, ...]] = ()
     """Ranges of how far apart things are, which a lower complexity raises."""
 
+    depths_for_range: ClassVar[bool] = False
+    """Whether a range of disparities is met by where things are put, so that the baseline needs no choosing."""
+
     width: int = 960
     """Image width, pixels."""
     height: int = 540
@@ -36,6 +39,18 @@ class FamilyConfig:
         """This config for a family that draws the user's files while it samples; others have theirs replaced."""
         return self
 
+    def within_disparities(self, least_px: float, greatest_px: float) -> Self:  # noqa: ARG002
+        """This config with its depths chosen for a range of disparities.
+
+        Raises ValueError for a range that the family's worlds cannot have.
+        """
+        if least_px > 0:
+            raise ValueError(
+                f"worlds of {type(self).__name__} reach to the horizon, so the least disparity can only be 0, "
+                f"not {least_px:g}"
+            )
+        return self
+
     def at_complexity(self, complexity: float) -> Self:
         """This config made simpler, for curricula: a tenth of the things at 0, as it is at 1.
 
@@ -44,7 +59,7 @@ class FamilyConfig:
         if not 0 <= complexity <= 1:
             raise ValueError(f"complexity must be from 0 to 1, got {complexity}")
         factor = EMPTIEST + (1 - EMPTIEST) * complexity
-        changes = {name: _scaled(getattr(self, name), factor) for name in self.crowd}
+        changes: dict[str, Any] = {name: _scaled(getattr(self, name), factor) for name in self.crowd}
         changes |= {name: _scaled(getattr(self, name), 1 / factor) for name in self.sparsity}
         return replace(self, **changes)
 

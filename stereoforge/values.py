@@ -35,6 +35,14 @@ def parse_size(text: str, flag: str = "size") -> tuple[int, int]:
     return sizes
 
 
+def parse_range(text: str, flag: str = "disparity-range") -> tuple[float, float]:
+    """(low, high) of "5,120"; `flag` names the flag in errors."""
+    match = re.fullmatch(r"(\d{1,5}(?:\.\d+)?),(\d{1,5}(?:\.\d+)?)", text)
+    if not match or float(match[1]) >= float(match[2]):
+        raise UsageError(f"--{flag} takes LOW,HIGH in pixels with LOW < HIGH, such as 5,120, not {text!r}")
+    return float(match[1]), float(match[2])
+
+
 def parse_shard(text: str) -> tuple[int, int]:
     """(index, count) of "3/16"."""
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text)

@@ -51,6 +51,8 @@ _REACH = 1.35
 class FlyingThingsConfig(FamilyConfig):
     """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
 
+    depths_for_range = True
+
     flying_objects: Count = (5, 20)
     """Objects in flight per scene."""
     background_objects: Count = (60, 200)
@@ -97,6 +99,16 @@ class FlyingThingsConfig(FamilyConfig):
 
     def with_assets(self, assets: AssetPool) -> FlyingThingsConfig:
         return replace(self, assets=assets)
+
+    def within_disparities(self, least_px: float, greatest_px: float) -> FlyingThingsConfig:
+        """The background stands where it did between farthest and nearest, on a logarithmic scale."""
+        if least_px <= 0:
+            raise ValueError(f"flying_things need a least disparity above 0, got {least_px:g}")
+        low, high = self.disparity_share
+        least, greatest = least_px / self.width, greatest_px / self.width
+        stretch = math.log(greatest / least) / math.log(high / low)
+        near, far = (least * (share / low) ** stretch for share in self.background_disparity_share)
+        return replace(self, disparity_share=(least, greatest), background_disparity_share=(near, far))
 
     def draws_own(self, rng: np.random.Generator, among: tuple[Asset, ...]) -> Asset | None:
         """One of the user's files of a kind, or None for one of the generator's own; draws only if there are any."""

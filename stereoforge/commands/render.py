@@ -25,7 +25,7 @@ from datagen.render import SCENE_TIMEOUT_S, local_executor, ray_executor
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console, progress_bar
-from stereoforge.values import parse_shard, parse_size, shown, shown_duration
+from stereoforge.values import parse_range, parse_shard, parse_size, shown, shown_duration
 from storage import open_tree
 
 DEFAULT_FAMILY = "flying_things"
@@ -85,6 +85,9 @@ class Render:
     """Your own pictures, to paint things with."""
     environments: Annotated[Path | None, shown("DIR", "none")] = None
     """Your own equirectangular HDR and EXR pictures, to light the worlds."""
+    disparity_range: Annotated[str | None, shown("LOW,HIGH", "the family's")] = None
+    """Least and greatest disparity of surfaces in pixels, met by choosing depths (flying_things) or the baseline
+    (the others, which reach to the horizon: LOW is 0); scenes outside are drawn anew."""
     dry_run: bool = False
     """Say what would be rendered, how long it would take and how much disk, measured on one frame of one
     scene; nothing is written."""
@@ -201,6 +204,9 @@ class Render:
             changes["passes"] = tuple(self.passes.split(","))
         if self.targets is not None:
             changes["targets"] = EXTRA_TARGETS if self.targets == "all" else tuple(self.targets.split(","))
+        if self.disparity_range is not None:
+            limits = parse_range(self.disparity_range)
+            changes["curation"] = replace(base.curation, disparity_px=limits)
         changes |= {key: getattr(self, key) for key in ("seed", "samples") if getattr(self, key) is not None}
         try:
             return replace(base, **changes)
