@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import ClassVar, Self
 
 import numpy as np
@@ -98,6 +98,12 @@ class Material:
     """Radiance the surface gives off, times its colour."""
 
 
+@lru_cache(maxsize=512)
+def _rotation_spline(times_frames: tuple[float, ...], rotations: tuple[Quaternion, ...]) -> RotationSpline:
+    """Slow to set up, and the parts of one thing all turn alike."""
+    return RotationSpline(times_frames, Rotation.from_quat([(x, y, z, w) for w, x, y, z in rotations]))
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """A smooth rigid motion through key poses: cubic spline of positions, rotation spline of attitudes."""
@@ -122,8 +128,8 @@ class Trajectory:
 
     @cached_property
     def _splines(self) -> tuple[CubicSpline, RotationSpline]:
-        rotations = Rotation.from_quat([(x, y, z, w) for w, x, y, z in self.rotations])
-        return CubicSpline(self.times_frames, self.positions_m), RotationSpline(self.times_frames, rotations)
+        turning = _rotation_spline(self.times_frames, self.rotations)
+        return CubicSpline(self.times_frames, self.positions_m), turning
 
     @cached_property
     def _resting(self) -> NDArray[np.float64]:
