@@ -47,18 +47,51 @@ def test_a_batch_is_solved_like_its_samples(form):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_gradients_agree_with_finite_differences(form):
-    problem = random_problem(7, 6, seed=3, style="smooth")
-    disparity, confidence, gradient, image = batch([problem])
+def test_every_entry_of_every_jacobian_agrees_with_finite_differences(form):
+    """What torch's gradcheck compares in its full mode and with its tolerances, every perturbed problem a sample of one
+    batch: two solves an input instead of over a thousand."""
+    disparity, confidence, gradient, image = batch([random_problem(7, 6, seed=3, style="smooth")])
     weights = image_weights(image, 2.55, torch.float64)
     confidence = 0.1 + 0.8 * confidence  # away from the floor, where there is a kink
     inputs = (disparity, confidence, gradient, weights.phi_x, weights.phi_y, weights.neighbors)
-    inputs = tuple(each.clone().requires_grad_() for each in inputs)
 
     def solved(d, c, g, phi_x, phi_y, w):
-        return refine_batch(d, c, g, ImageWeights(phi_x, phi_y, w), form=form, tolerance=1e-12)
+        return refine_batch(d, c, g, ImageWeights(phi_x, phi_y, w), form=form, tolerance=TIGHT)
+
+    pixels = disparity.numel()
+    copies = [each.repeat(pixels, *[1] * (each.ndim - 1)).requires_grad_() for each in inputs]
+    solved(*copies).flatten(1).diagonal().sum().backward()  # of sample p the loss is its pixel p
+    for number, (each, copy) in enumerate(zip(inputs, copies, strict=True)):
+        steps = 1e-5 * torch.eye(each.numel(), dtype=torch.float64).view(-1, *each.shape[1:])
+        moved = [other.expand(2 * each.numel(), *other.shape[1:]) for other in inputs]
+        moved[number] = torch.cat([each + steps, each - steps])
+        above, below = solved(*moved).flatten(1).chunk(2)
+        numeric = (above - below).T / 2e-5  # (pixels, elements)
+        assert copy.grad is not None
+        torch.testing.assert_close(copy.grad.flatten(1), numeric, rtol=1e-4, atol=1e-4)
+
+
+def test_gradcheck():
+    """torch's own check, of random directions."""
+    disparity, confidence, gradient, image = batch([random_problem(7, 6, seed=3, style="smooth")])
+    weights = image_weights(image, 2.55, torch.float64)
+    inputs = [each.clone().requires_grad_() for each in (disparity, 0.1 + 0.8 * confidence, gradient)]
+
+    def solved(d, c, g):
+        return refine_batch(d, c, g, weights, tolerance=TIGHT)
 
     assert torch.autograd.gradcheck(solved, inputs, eps=1e-5, atol=1e-4, rtol=1e-4, fast_mode=True)
+
+
+def test_whole_frames_in_single_precision():
+    """Couplings thousands of times tau, disparities of tens of pixels: the residual of float32 vectors stalls there."""
+    problem = random_problem(90, 130, seed=6, style="smooth")
+    problem.confidence[:, 40:] *= 1e-3
+    disparity, confidence, gradient, image = (each.float() for each in batch([problem]))
+    found = refine_batch(disparity, confidence, gradient, image_weights(image, 2.55), tolerance=1e-7)
+    expected = solve_mrf(*problem.inputs, solver="direct").disparity
+    assert found.dtype == torch.float32
+    np.testing.assert_allclose(found[0], expected, atol=0.01)
 
 
 def test_descending_the_gradients_finds_a_confidence_that_helps():
