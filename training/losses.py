@@ -128,6 +128,26 @@ def confidence_cross_entropy(
     return masked_mean(F.cross_entropy(logits, labels[:, 0], reduction="none"), ~torch.isnan(error[:, 0]))
 
 
+def refinement_l1(
+    refined: Tensor, truth: Tensor, gradient: Tensor, gradient_weight: float, threshold_px: float
+) -> Tensor:
+    """Mean |d - d*| of a refined disparity, and so many times `masked_gradient_l1` of its forward differences (ours).
+
+    Args:
+        refined, truth: (B, 1, H, W), NaN in `truth` where there is none.
+        gradient: (B, 2, H, W) forward differences of the truth, NaN where there is none.
+        gradient_weight: As lambda in eq. 9.
+        threshold_px: Larger true differences are discontinuities.
+    """
+    across = F.pad(refined.diff(dim=3), (0, 1))
+    downwards = F.pad(refined.diff(dim=2), (0, 0, 0, 1))
+    inside = F.pad(torch.ones_like(refined[..., 1:, 1:]), (0, 1, 0, 1)) > 0
+    slopes = masked_gradient_l1(
+        torch.cat([across, downwards], dim=1), torch.where(inside, gradient, torch.nan), threshold_px
+    )
+    return masked_mean((refined - truth).abs(), ~torch.isnan(truth)) + gradient_weight * slopes
+
+
 def masked_gradient_l1(prediction: Tensor, gradient: Tensor, threshold_px: float) -> Tensor:
     """Mean over unmasked pixels of |gx - gx*| + |gy - gy*|.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 import torch
@@ -15,7 +14,7 @@ from training.errors import TrainingError
 from training.free import FreeInputs, as_free_inputs
 from training.inference import estimate
 from training.networks import ConfNet, DispNetCorr1D, GradNet
-from training.weights import StoredNetwork, has_weights, load_confnet, load_gradnet, load_regressor
+from training.weights import has_weights, load_confnet, load_gradnet, load_regressor, on_regressor
 
 
 @dataclass(frozen=True)
@@ -53,9 +52,9 @@ class StereoPredictor:
         self._confnet: ConfNet | None = None
         self._gradnet: GradNet | None = None
         if regressor == "regressor" and has_weights(run, "confnet"):
-            self._confnet = _matching(run, "confnet", load_confnet(run), stored.sha256).to(self._device)
+            self._confnet = on_regressor(run, "confnet", load_confnet(run), stored.sha256).to(self._device)
         if regressor == "regressor" and has_weights(run, "gradnet"):
-            self._gradnet = _matching(run, "gradnet", load_gradnet(run), stored.sha256).to(self._device)
+            self._gradnet = on_regressor(run, "gradnet", load_gradnet(run), stored.sha256).to(self._device)
 
     @property
     def networks(self) -> tuple[DispNetCorr1D, ConfNet | None, GradNet | None]:
@@ -157,17 +156,6 @@ class FreePredictor:
         if self._gradnet is not None:
             gradient = _as_array(self._gradnet(image, features))
         return Prediction(_as_array(inputs.disparity)[..., 0], confidence, gradient)
-
-
-Head = TypeVar("Head", ConfNet, GradNet)
-
-
-def _matching(run: Path, task: str, stored: StoredNetwork[Head], regressor_sha256: str) -> Head:
-    if stored.regressor_sha256 != regressor_sha256:
-        raise TrainingError(
-            f"{run}: its {task} was trained on another regressor than the folder's; train it again"
-        )
-    return stored.network
 
 
 def _as_array(maps: Tensor) -> NDArray[np.float32]:

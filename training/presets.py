@@ -20,7 +20,7 @@ from training.free import FREE_FEATURES
 from training.losses import STAGE_WEIGHTS, STATIC_WEIGHTS, ScaleWeights
 from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
 
-Task = Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free"]
+Task = Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free", "joint"]
 TASKS: tuple[Task, ...] = get_args(Task)
 
 
@@ -119,6 +119,27 @@ class FreeGradNetPreset(GradNetPreset):
 
     matcher: SGBMParameters = field(default_factory=SGBMParameters)
     """Matches every crop and every validation frame as the run goes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointPreset(Preset):
+    """ConfNet and GradNet trained further through the refinement (ours); the networks are a run folder's.
+
+    Colours stay as they are: the refinement reads edges off the image in absolute units, and noise would put one
+    between any two pixels.
+    """
+
+    refined_weight: float = 0.2
+    """Weight of the refined disparity's loss beside the heads' own, cross-entropy and gradient L1, whose weight is 1;
+    0 trains the heads on their own losses alone."""
+    refined_gradient_weight: float = 5.0
+    """Weight of the refined disparity's gradient error beside its error in pixels."""
+    correct_within_px: float = 1.0
+    """As for ConfNet."""
+    gradient_threshold_px: float = 1.0
+    """As for GradNet, and for the refined disparity's gradient."""
+    tolerance: float = 1e-4
+    """Relative residual of the solves, forwards and backwards."""
 
 
 def _every(interval: int, end: int) -> tuple[int, ...]:
@@ -292,6 +313,27 @@ TINY_FREE_GRADNET = replace(
     validation_samples=16,
 )
 
+SMALL_JOINT = JointPreset(
+    steps=2000,
+    batch_size=4,
+    crop_width=320,
+    crop_height=128,
+    optimizer=replace(SMALL_OPTIMIZER, learning_rate=3e-4, warmup_steps=50),
+    augmentation=replace(
+        SMALL_AUGMENTATION, log_brightness=0.0, log_gamma=0.0, log_contrast=0.0, log_color=0.0, noise=0.0
+    ),
+    validation_interval=250,
+)
+TINY_JOINT = replace(
+    SMALL_JOINT,
+    steps=200,
+    batch_size=2,
+    crop_width=256,
+    optimizer=replace(SMALL_JOINT.optimizer, warmup_steps=20),
+    validation_interval=50,
+    validation_samples=16,
+)
+
 PRESETS: dict[Task, dict[str, Preset]] = {
     "regressor": {"tiny": TINY_REGRESSOR, "small": SMALL_REGRESSOR, "full": FULL_REGRESSOR},
     "regressor_f": {"tiny": TINY_FINE_TUNING, "small": SMALL_FINE_TUNING, "full": FULL_FINE_TUNING},
@@ -299,6 +341,7 @@ PRESETS: dict[Task, dict[str, Preset]] = {
     "gradnet": {"tiny": TINY_GRADNET, "small": SMALL_GRADNET, "full": FULL_GRADNET},
     "confnet_free": {"tiny": TINY_FREE_CONFNET, "small": SMALL_FREE_CONFNET},
     "gradnet_free": {"tiny": TINY_FREE_GRADNET, "small": SMALL_FREE_GRADNET},
+    "joint": {"tiny": TINY_JOINT, "small": SMALL_JOINT},
 }
 
 

@@ -16,6 +16,7 @@ import pytorch_lightning as pl
 import torch
 from pytorch_lightning.loggers import TensorBoardLogger
 
+from refine.baselines.ours import Ours
 from storage import write_text
 from training.callbacks import BestWeights, RunProgress
 from training.checkpoints import WholeCheckpoints, last_checkpoint
@@ -30,6 +31,7 @@ from training.presets import (
     FreeConfNetPreset,
     FreeGradNetPreset,
     GradNetPreset,
+    JointPreset,
     Preset,
     RegressorPreset,
     change_preset,
@@ -43,6 +45,8 @@ from training.tasks import (
     FreeConfNetTask,
     FreeGradNetTask,
     GradNetTask,
+    JointHeads,
+    JointTask,
     RegressorTask,
     StereoTask,
 )
@@ -50,7 +54,10 @@ from training.weights import (
     TrainingSummary,
     copy_weights,
     has_weights,
+    load_confnet,
+    load_gradnet,
     load_regressor,
+    on_regressor,
     read_summary,
     save_weights,
 )
@@ -69,6 +76,7 @@ def train(
     changes: Mapping[str, Any] | None = None,
     pseudo: Path | None = None,
     init: Path | None = None,
+    refinement: Ours | None = None,
     resume: bool = False,
     steps: int | None = None,
     seed: int = 0,
@@ -82,7 +90,8 @@ def train(
 
     Args:
         task: `regressor`, `regressor_f` (eq. 9, starts from a regressor), `confnet` or `gradnet` (on a frozen one),
-            `confnet_free` or `gradnet_free` (on semi-global matching, need no regressor).
+            `confnet_free` or `gradnet_free` (on semi-global matching, need no regressor), `joint` (confnet and
+            gradnet of another run folder, trained further through the refinement).
         data: data sets (`datagen.source.open_source`) and their weights, how often each is drawn from; their train
             splits are trained on, their val splits decide which weights are kept.
         out: run folder; receives `<task>.safetensors`, `<task>.json` and `logs/<task>/`.
@@ -91,7 +100,8 @@ def train(
         changes: other values of some of the preset's fields.
         pseudo: folder of disparities (`training.pseudo`) to train on instead of the one data set's own truth.
         init: run folder with the regressor to start from (`regressor`: optional) or to build on (other tasks: `out`
-            by default, and copied there).
+            by default, and copied there). `joint`: the run folder whose three networks to start from, not `out`.
+        refinement: `joint`: what to train through; the MRF with its default parameters if None.
         resume: continue from the last checkpoint, as if never interrupted; starts anew where there is none.
         steps: length of the run, the preset's by default; all its schedules are scaled to it.
         workers: processes that prepare crops; results do not depend on their number.
@@ -117,6 +127,10 @@ def train(
     hardware = trainer_options(device, precision)
     out.mkdir(parents=True, exist_ok=True)
     logs = out / "logs" / task
+    if isinstance(preset, JointPreset):
+        refinement = refinement or Ours()
+    elif refinement is not None:
+        raise TrainingError(f"only joint trains through a refinement, {task} does not")
     checkpoint = _prepare(
         out,
         task,
@@ -130,6 +144,7 @@ def train(
             "pseudo": None if pseudo is None else str(pseudo),
             "precision": precision,
             "processes": process_count(),
+            "refinement": None if refinement is None else asdict(refinement),
         },
     )
     sources, held_out = open_sources(data, (preset.crop_height, preset.crop_width), validation)
@@ -148,7 +163,7 @@ def train(
     )
     with _quiet_lightning(), torch.random.fork_rng():
         torch.manual_seed(seed)
-        lightning_task, regressor_sha256 = _build_task(preset, module, out, init, steps, seed)
+        lightning_task, regressor_sha256 = _build_task(preset, module, out, init, refinement, steps, seed)
         if hardware["accelerator"] == "cpu" or precision != "32" or not torch.cuda.is_available():
             faster_layout(lightning_task)
         lightning_task.mixed_precision = precision != "32"
@@ -157,7 +172,8 @@ def train(
 
         def save(step: int, figures: dict[str, float]) -> None:
             description = replace(summary, best_step=step, validation=figures)
-            save_weights(out, task, lightning_task.kept_network, description, regressor_sha256)
+            for name, network in _kept_networks(task, lightning_task).items():
+                save_weights(out, name, network, description, regressor_sha256)
             write_model_card(out)
 
         callbacks: list[pl.Callback] = [BestWeights(save), last_checkpoint(logs / CHECKPOINT)]
@@ -166,7 +182,18 @@ def train(
         trainer = _trainer(preset, steps, logs, callbacks, hardware)
         trainer.fit(lightning_task, module, ckpt_path=checkpoint, weights_only=True)
         trainer.strategy.barrier()  # the first process writes what the others read now
-    return read_summary(out, task)
+    return read_summary(out, written_by(task)[0])
+
+
+def written_by(task: str) -> tuple[str, ...]:
+    """The networks that a task leaves in its run folder."""
+    return ("confnet", "gradnet") if task == "joint" else (task,)
+
+
+def _kept_networks(task: str, lightning_task: StereoTask) -> dict[str, Any]:
+    kept = lightning_task.kept_network
+    parts = [kept.confnet, kept.gradnet] if isinstance(kept, JointHeads) else [kept]
+    return dict(zip(written_by(task), parts, strict=True))
 
 
 def _prepare(out: Path, task: str, resume: bool, settings: dict[str, Any]) -> Path | None:
@@ -178,10 +205,12 @@ def _prepare(out: Path, task: str, resume: bool, settings: dict[str, Any]) -> Pa
     noted = logs / "settings.json"
     if resume and noted.is_file():
         _check_settings(noted, settings)
-    elif has_weights(out, task):
-        raise TrainingError(
-            f"{out}: already holds a {task}; continue it with --resume or choose another folder"
-        )
+    else:
+        for name in written_by(task):
+            if has_weights(out, name):
+                raise TrainingError(
+                    f"{out}: already holds a {name}; continue it with --resume or choose another folder"
+                )
     if process_rank() == 0:
         write_text(noted, json.dumps(settings, indent=2) + "\n")
     checkpoint = logs / CHECKPOINT
@@ -195,16 +224,33 @@ def _with_pseudo_truth(sources: Sequence[Source], folder: Path) -> Source:
 
 
 def _build_task(
-    preset: Preset, module: StereoDataModule, out: Path, init: Path | None, steps: int, seed: int
+    preset: Preset,
+    module: StereoDataModule,
+    out: Path,
+    init: Path | None,
+    refinement: Ours | None,
+    steps: int,
+    seed: int,
 ) -> tuple[StereoTask, str | None]:
     """The task of a preset with its networks, and the digest of the regressor a head is built on."""
     if isinstance(preset, RegressorPreset):
         return RegressorTask(preset, _new_regressor(preset, module, init), steps, seed), None
     if isinstance(preset, FreeConfNetPreset | FreeGradNetPreset):
         return _build_free_task(preset, module, steps, seed), None
+    if isinstance(preset, JointPreset) and (init is None or init.resolve() == out.resolve()):
+        raise TrainingError("joint starts from another run folder's networks: name it as init (--init)")
     regressor = load_regressor(_with_regressor(out, init))
     if isinstance(preset, FineTuningPreset):
         return FineTuningTask(preset, regressor.network, steps, seed), None
+    if isinstance(preset, JointPreset):
+        assert init is not None
+        assert refinement is not None
+        heads = JointHeads(
+            on_regressor(init, "confnet", load_confnet(init), regressor.sha256),
+            on_regressor(init, "gradnet", load_gradnet(init), regressor.sha256),
+        )
+        joint = JointTask(preset, regressor.network, heads.train(), refinement, steps, seed)
+        return joint, regressor.sha256
     channels = regressor.network.feature_channels
     task: ConfNetTask | GradNetTask
     if isinstance(preset, ConfNetPreset):

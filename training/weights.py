@@ -103,6 +103,15 @@ def load_gradnet(run: Path, task: str = "gradnet") -> StoredNetwork[GradNet]:
     return _load(run, task, lambda config: GradNet(_structure(config, HeadConfig)))
 
 
+def on_regressor(run: Path, task: str, stored: StoredNetwork[Network], regressor_sha256: str) -> Network:
+    """A head that was trained on this regressor; TrainingError if it was on another."""
+    if stored.regressor_sha256 != regressor_sha256:
+        raise TrainingError(
+            f"{run}: its {task} was trained on another regressor than the folder's; train it again"
+        )
+    return stored.network
+
+
 def read_summary(run: Path, task: str) -> TrainingSummary:
     """How the network of a run folder came about. Raises TrainingError, naming what is wrong."""
     path = run / f"{task}.json"

@@ -11,6 +11,7 @@ import tyro
 from stereoforge.errors import UsageError
 from stereoforge.progress import console
 from stereoforge.values import parse_size, parse_weighted_source, shown
+from storage import write_bytes
 
 
 @dataclass(frozen=True)
@@ -23,13 +24,23 @@ class Train:
 
     task: Annotated[
         tyro.conf.Positional[
-            Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free", "rdf"]
+            Literal[
+                "regressor",
+                "regressor_f",
+                "confnet",
+                "gradnet",
+                "confnet_free",
+                "gradnet_free",
+                "joint",
+                "rdf",
+            ]
         ],
         shown("TASK"),
     ]
     """regressor (DispNetCorr1D), regressor_f (fine-tuned on gradients too), confnet or gradnet; confnet_free and
     gradnet_free need no regressor: they learn from semi-global matching and serve any disparity. rdf: a
-    random forest as ConfNet's rival."""
+    random forest as ConfNet's rival. joint: trains confnet and gradnet of --init further, through the refinement,
+    into another run folder."""
     data: Annotated[tuple[str, ...], shown("DATA[:WEIGHT]")]
     """Data sets, each with how often it is drawn from relative to the others (default 1): folders or URLs, with
     FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
@@ -48,7 +59,8 @@ class Train:
     pseudo: Annotated[Path | None, shown("DIR", "none")] = None
     """Folder of disparities to train on instead of the data set's own truth: <frame name>.pfm or KITTI-like .png."""
     init: Annotated[Path | None, shown("RUN", "none")] = None
-    """Run folder of the regressor to start from or to build on."""
+    """Run folder of the regressor to start from or to build on; for joint, of all three networks and, where they are
+    validated, of the refinement's parameters, which are copied too."""
     resume: bool = False
     """Continue from the last checkpoint as if never interrupted."""
     steps: Annotated[int | None, shown("N", "the preset's")] = None
@@ -74,8 +86,9 @@ class Train:
         if self.task == "rdf":
             self._train_forest([source for source, _ in data])
             return
+        from stereoforge.prediction import open_settings, parameters_file
         from training.hardware import process_rank
-        from training.train import train
+        from training.train import train, written_by
 
         summary = train(
             self.task,
@@ -86,6 +99,7 @@ class Train:
             changes=self._changes(),
             pseudo=self.pseudo,
             init=self.init,
+            refinement=open_settings(None, self.init).ours if self.task == "joint" else None,
             resume=self.resume,
             steps=self.steps,
             seed=self.seed,
@@ -95,9 +109,11 @@ class Train:
         )
         if process_rank() > 0:
             return
+        if self.task == "joint" and self.init is not None and parameters_file(self.init).exists():
+            write_bytes(parameters_file(self.out), parameters_file(self.init).read_bytes())
         figures = ", ".join(f"{name} {value:.4g}" for name, value in summary.validation.items())
         console.print(
-            f"{self.out / self.task}.safetensors: step {summary.best_step} of {summary.steps}"
+            f"{self.out / ' and '.join(written_by(self.task))}: step {summary.best_step} of {summary.steps}"
             + (
                 f"; validation {figures}"
                 if figures

@@ -3,6 +3,7 @@
 from training.tasks.base import StereoTask
 from training.tasks.free import FreeConfNetTask, FreeGradNetTask
 from training.tasks.heads import ConfNetTask, GradNetTask
+from training.tasks.joint import JointHeads, JointTask
 from training.tasks.regressor import FineTuningTask, RegressorTask
 
 __all__ = [
@@ -11,6 +12,8 @@ __all__ = [
     "FreeConfNetTask",
     "FreeGradNetTask",
     "GradNetTask",
+    "JointHeads",
+    "JointTask",
     "RegressorTask",
     "StereoTask",
 ]

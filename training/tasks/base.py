@@ -15,7 +15,6 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from training.data import Batch
 from training.errors import TrainingError
-from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.presets import OptimizerConfig, Preset
 from viewing import Picture
 
@@ -40,7 +39,7 @@ class StereoTask(pl.LightningModule):
 
     monitor: ClassVar[str]
     """The validation figure whose least value marks the best weights."""
-    network: DispNetCorr1D | ConfNet | GradNet
+    network: nn.Module
 
     def __init__(self, preset: Preset, steps: int, seed: int) -> None:
         super().__init__()

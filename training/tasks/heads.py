@@ -24,7 +24,9 @@ from training.tasks.base import StereoTask, image_of, map_of
 from viewing import Picture, confidence_picture, error_picture, gradient_picture, side_by_side
 
 
-class _HeadTask(StereoTask):
+class HeadTask(StereoTask):
+    """Networks on a frozen regressor."""
+
     def __init__(self, preset: Preset, regressor: DispNetCorr1D, steps: int, seed: int) -> None:
         super().__init__(preset, steps, seed)
         self.regressor = regressor.requires_grad_(False).eval()
@@ -39,7 +41,7 @@ class _HeadTask(StereoTask):
         return self
 
 
-class ConfNetTask(_HeadTask):
+class ConfNetTask(HeadTask):
     """Cross-entropy of "correct within t" (section 3.2 of the paper)."""
 
     monitor = "validation/auc"
@@ -88,7 +90,7 @@ class ConfNetTask(_HeadTask):
         )
 
 
-class GradNetTask(_HeadTask):
+class GradNetTask(HeadTask):
     """Masked L1 on the disparity's forward differences (section 3.3 of the paper)."""
 
     monitor = "validation/gradient"

@@ -1,0 +1,142 @@
+"""Training ConfNet and GradNet through the refinement, against the refined disparity (ours)."""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from torch import Tensor, nn
+
+from refine.baselines.ours import Ours
+from refine.differentiable import image_weights, refine_batch
+from training.data import Batch
+from training.inference import estimate, regress_consistently
+from training.losses import confidence_cross_entropy, masked_gradient_l1, refinement_l1
+from training.metrics import (
+    bad_rate,
+    end_point_error,
+    forward_differences,
+    gradient_error,
+    sparsification_auc,
+)
+from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.presets import JointPreset
+from training.tasks.base import image_of, map_of
+from training.tasks.heads import HeadTask
+from viewing import (
+    Picture,
+    confidence_picture,
+    disparity_picture,
+    error_picture,
+    gradient_picture,
+    side_by_side,
+)
+
+
+class JointHeads(nn.Module):
+    """ConfNet and GradNet as one network to be trained."""
+
+    def __init__(self, confnet: ConfNet, gradnet: GradNet) -> None:
+        super().__init__()
+        self.confnet = confnet
+        self.gradnet = gradnet
+
+
+class JointTask(HeadTask):
+    """L1 of the refined disparity and of its gradient, and a share of what the heads learned from before.
+
+    The regressor is frozen. The refinement is solved exactly, and the loss's slope comes back through it by the
+    implicit function theorem, so ConfNet learns where the disparity does harm and GradNet which slopes help.
+    """
+
+    monitor = "validation/refined_epe"
+    network: JointHeads
+
+    def __init__(
+        self,
+        preset: JointPreset,
+        regressor: DispNetCorr1D,
+        network: JointHeads,
+        refinement: Ours,
+        steps: int,
+        seed: int,
+    ) -> None:
+        super().__init__(preset, regressor, steps, seed)
+        self.network = network
+        self.refinement = refinement
+        self.losses = preset
+
+    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+        """What ConfNet sees (GradNet sees all but the last of it), and the disparity it is about."""
+        with torch.no_grad():
+            regression, consistency = regress_consistently(self.regressor, batch["left"], batch["right"])
+        return (batch["left"], regression.features, consistency), regression.disparity
+
+    def refine(self, image: Tensor, disparity: Tensor, logits: Tensor, gradient: Tensor) -> Tensor:
+        """The refined disparity (B, 1, H, W), differentiable in ConfNet's logits and GradNet's gradient."""
+        shape = self.refinement.shape
+        # `ConfidenceShape.apply` of softmax(logits)[1], without ever leaving the logarithms.
+        log_confidence = F.logsigmoid((logits[:, 1] - logits[:, 0]) / shape.temperature)
+        return refine_batch(
+            disparity[:, 0],
+            torch.exp(shape.power * log_confidence),
+            gradient,
+            image_weights(image * 255, self.refinement.parameters.sigma_r),
+            self.refinement.parameters,
+            self.refinement.form,
+            self.losses.tolerance,
+        )[:, None]
+
+    def loss(self, batch: Batch) -> Tensor:
+        inputs, disparity = self.head_inputs(batch)
+        logits, gradient = self.network.confnet(*inputs), self.network.gradnet(*inputs[:-1])
+        own = confidence_cross_entropy(
+            logits, disparity, batch["disparity"], self.losses.correct_within_px
+        ) + masked_gradient_l1(gradient, batch["gradient"], self.losses.gradient_threshold_px)
+        if self.losses.refined_weight == 0:
+            return own
+        refined = self.refine(batch["left"], disparity, logits, gradient)
+        through = refinement_l1(
+            refined,
+            batch["disparity"],
+            batch["gradient"],
+            self.losses.refined_gradient_weight,
+            self.losses.gradient_threshold_px,
+        )
+        return own + self.losses.refined_weight * through
+
+    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+        heads = self.kept_network
+        disparity, confidence, gradient = estimate(
+            self.regressor, heads.confnet, heads.gradnet, batch["left"], batch["right"]
+        )
+        assert confidence is not None
+        assert gradient is not None
+        image, initial, trust, slopes = (
+            image_of(batch["left"]),
+            map_of(disparity),
+            map_of(confidence),
+            map_of(gradient),
+        )
+        solved = self.refinement.solve(initial, trust, slopes, image).disparity
+        refined = torch.from_numpy(solved).to(disparity)[None, None]
+        truth, threshold = batch["disparity"], self.losses.gradient_threshold_px
+        figures = {
+            "refined_epe": end_point_error(refined, truth),
+            "refined_bad1": bad_rate(refined, truth, 1.0),
+            "refined_gradient": gradient_error(forward_differences(refined), batch["gradient"], threshold),
+            "gradient": gradient_error(gradient, batch["gradient"], threshold),
+            "auc": sparsification_auc(confidence, disparity, truth, self.losses.correct_within_px),
+        }
+        return figures, {"refined": refined, "confidence": confidence, "gradient": gradient}
+
+    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
+        nearest = max(float(torch.nan_to_num(batch["disparity"]).max()), 1.0)
+        return side_by_side(
+            [
+                image_of(batch["left"]),
+                disparity_picture(map_of(maps["refined"]), nearest),
+                error_picture(map_of(maps["refined"] - batch["disparity"]), 1.0),
+                confidence_picture(map_of(maps["confidence"])),
+                gradient_picture(map_of(maps["gradient"])),
+            ]
+        )
