@@ -9,7 +9,7 @@ from __future__ import annotations
 import heapq
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +40,9 @@ class EvaluationOptions:
     error."""
     first_panels: int = 4
     """Frames shown because they come first."""
+    posterior_samples: int = 0
+    """Samples a frame by which the judged method's standard deviations are estimated; 0 leaves them out. Each takes as
+    long as a refinement."""
     worst_panels: int = 3
     """Frames shown because `Evaluation.judged` has its largest end-point errors there."""
 
@@ -59,6 +62,9 @@ class FrameScore:
     curves: dict[str, SparsificationCurve]
     """Sparsification of the initial disparity by each confidence measure: "confnet" and the frame's
     others."""
+    refined_aucs: dict[str, float] = field(default_factory=dict)
+    """Areas under the curves of the judged method's disparity, not the initial one: by its "posterior" deviation and
+    by "confnet", and the bounds. Empty without samples of the posterior."""
 
     @cached_property
     def methods(self) -> dict[str, MethodScore]:
@@ -166,7 +172,8 @@ class _Run:
                 disparities[method.name] = output.disparity
         error = pools[self.judged].regions["all"].end_point_error
         self._keep(Panel(frame, disparities, order=len(self.scores)), error)
-        self.scores.append(self._frame_score(frame, pools))
+        refined_aucs = self._refined_aucs(frame, disparities)
+        self.scores.append(replace(self._frame_score(frame, pools), refined_aucs=refined_aucs))
 
     def finish(self) -> Evaluation:
         """Pool the frames taken."""
@@ -207,6 +214,26 @@ class _Run:
             heapq.heappush(self.worst, (error, panel.order, panel))
             if len(self.worst) > self.options.worst_panels:
                 heapq.heappop(self.worst)
+
+    def _refined_aucs(
+        self, frame: EvaluationFrame, disparities: dict[str, NDArray[np.float32]]
+    ) -> dict[str, float]:
+        """How well the judged method's own deviations, and ConfNet, tell its wrong disparities from its right ones."""
+        method = next(method for method in self.methods if method.name == self.judged)
+        samples, refined = self.options.posterior_samples, disparities.get(self.judged)
+        deviation = method.deviation(frame, samples) if samples and refined is not None else None
+        if deviation is None or refined is None:
+            return {}
+        measures = {"posterior": -deviation}
+        if frame.confidence is not None:
+            measures["confnet"] = frame.confidence
+        threshold = self.options.bad_threshold
+        bad = bad_pixel_rate(refined, frame.truth, threshold)
+        bounds = {"random": bad, "optimal": optimal_auc(bad) if np.isfinite(bad) else float("nan")}
+        return {
+            name: sparsification_curve(refined, frame.truth, values, threshold).auc
+            for name, values in measures.items()
+        } | bounds
 
     def _frame_score(self, frame: EvaluationFrame, pools: dict[str, MethodPool]) -> FrameScore:
         threshold = self.options.bad_threshold

@@ -110,6 +110,10 @@ class Method(ABC):
     def run(self, frame: EvaluationFrame) -> MethodOutput:
         """Process one frame; only an upper bound may look at its ground truth."""
 
+    def deviation(self, frame: EvaluationFrame, samples: int) -> NDArray[np.float32] | None:  # noqa: ARG002
+        """How unsure the method is of each of its disparities, (H, W), less is surer; None if it does not know."""
+        return None
+
     def missing(self, frame: EvaluationFrame) -> tuple[str, ...]:
         """Which of the fields it needs this frame does not have."""
         return tuple(sorted(name for name in self.needs if getattr(frame, name) is None))

@@ -29,6 +29,7 @@ from refine.report_tables import (
     frame_table,
     missing_notes,
     overview_table,
+    refined_confidence_table,
     summary_tiles,
 )
 from refine.results import EvaluatedSet, mean_curves, results_csv, results_json
@@ -95,6 +96,7 @@ class SetView:
     errors: Table
     missing: list[str]
     confidences: Table
+    refined_confidences: Table | None
     frames: Table
     curve_plots: tuple[Markup, ...]
     auc_plot: Markup | None
@@ -175,6 +177,7 @@ def _set_view(each: EvaluatedSet, index: int, seed: int) -> SetView:
         errors=error_table(evaluation),
         missing=missing_notes(evaluation),
         confidences=confidence_table(evaluation),
+        refined_confidences=refined_confidence_table(evaluation),
         frames=frame_table(evaluation),
         curve_plots=tuple(hoverable(figure) for _, figure in _curve_figures(evaluation)),
         auc_plot=hoverable(auc_figure(evaluation.frames)) if len(evaluation.frames) > 1 else None,

@@ -10,11 +10,12 @@ from refine.bootstrap import REFERENCE, Bootstrap
 from refine.evaluation import Evaluation, FrameScore
 from refine.paper import PAPER, counterpart
 from refine.pooling import MethodScore
-from refine.results import EvaluatedSet, mean_aucs
+from refine.results import EvaluatedSet, mean_aucs, mean_refined_aucs
 
 CONFIDENCE_LABELS = {
     "confnet": "ConfNet",
     "rdf": "Random forest",
+    "posterior": "Posterior deviation",
     "lrc": "Left-right consistency",
     "random": "Random order",
     "optimal": "Optimal order",
@@ -190,6 +191,19 @@ def confidence_table(evaluation: Evaluation) -> Table:
         rows.append((CONFIDENCE_LABELS.get(name, name), tuple(cells)))
     headings = ("Order of removal", "mean AUC", "of random → optimal, %", "ConfNet is better, % of frames")
     return Table(headings if compared else headings[:-1], tuple(rows))
+
+
+def refined_confidence_table(evaluation: Evaluation) -> Table | None:
+    """Mean area under the curve of the refined disparity, by the posterior's deviation and by ConfNet."""
+    aucs = mean_refined_aucs(evaluation)
+    if not aucs:
+        return None
+    room = aucs["random"] - aucs["optimal"]
+    rows = []
+    for name, auc in sorted(aucs.items(), key=lambda item: item[1]):
+        share = (aucs["random"] - auc) / room if room > 0 else math.nan
+        rows.append((CONFIDENCE_LABELS.get(name, name), (number(auc, 4), number(share, 1, scale=100))))
+    return Table(("Order of removal", "mean AUC", "of random → optimal, %"), tuple(rows))
 
 
 def _share_beaten(evaluation: Evaluation, name: str) -> float:

@@ -49,7 +49,7 @@ class ResultRow:
     frame: str
     """The frame's name; empty for the whole set."""
     kind: str
-    """"method" or "confidence"."""
+    """"method"; "confidence", of the initial disparity; "refined_confidence", of the judged method's."""
     name: str
     values: Mapping[str, float]
     """Some of `COLUMNS`; NaN where a mask had no pixels."""
@@ -61,11 +61,15 @@ def result_rows(evaluation: Evaluation) -> Iterator[ResultRow]:
         yield ResultRow(None, "", "method", name, score.measures())
     for name, auc in mean_aucs(evaluation).items():
         yield ResultRow(None, "", "confidence", name, {"auc": auc})
+    for name, auc in mean_refined_aucs(evaluation).items():
+        yield ResultRow(None, "", "refined_confidence", name, {"auc": auc})
     for order, frame in enumerate(evaluation.frames):
         for name, score in frame.methods.items():
             yield ResultRow(order, frame.name, "method", name, score.measures())
         for name, auc in frame.aucs.items():
             yield ResultRow(order, frame.name, "confidence", name, {"auc": auc})
+        for name, auc in frame.refined_aucs.items():
+            yield ResultRow(order, frame.name, "refined_confidence", name, {"auc": auc})
 
 
 def mean_aucs(evaluation: Evaluation) -> dict[str, float]:
@@ -74,8 +78,12 @@ def mean_aucs(evaluation: Evaluation) -> dict[str, float]:
     Frames without ground truth do not count. "random" (a random order) and "optimal" (the ground truth's
     order) are the bounds.
     """
-    names = dict.fromkeys(name for frame in evaluation.frames for name in frame.aucs)
-    return {name: _mean([frame.aucs.get(name, math.nan) for frame in evaluation.frames]) for name in names}
+    return _means([frame.aucs for frame in evaluation.frames])
+
+
+def mean_refined_aucs(evaluation: Evaluation) -> dict[str, float]:
+    """The same of the judged method's disparity; empty where its deviations were not sampled."""
+    return _means([frame.refined_aucs for frame in evaluation.frames])
 
 
 def mean_curves(evaluation: Evaluation) -> dict[str, SparsificationCurve]:
@@ -130,13 +138,22 @@ def _set_document(each: EvaluatedSet) -> dict[str, Any]:
         "skipped": evaluation.skipped,
         "methods": {},
         "confidences": {},
+        "refined_confidences": {},
         # A list: two frames may share a name.
-        "frames": [{"name": frame.name, "methods": {}, "confidences": {}} for frame in evaluation.frames],
+        "frames": [
+            {"name": frame.name, "methods": {}, "confidences": {}, "refined_confidences": {}}
+            for frame in evaluation.frames
+        ],
     }
     for row in result_rows(evaluation):
         place = document if row.order is None else document["frames"][row.order]
         place[f"{row.kind}s"][row.name] = {key: null_nan(value) for key, value in row.values.items()}
     return document
+
+
+def _means(areas: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    names = dict.fromkeys(name for each in areas for name in each)
+    return {name: _mean([each.get(name, math.nan) for each in areas]) for name in names}
 
 
 def _mean(values: list[float]) -> float:

@@ -63,10 +63,14 @@ def family_of(source: str, frames: Sequence[StereoFrame]) -> str:
     return open_source(source).format.name
 
 
-def evaluation_options(family: str, bad_threshold: float | None = None) -> EvaluationOptions:
+def evaluation_options(
+    family: str, bad_threshold: float | None = None, posterior_samples: int = 0
+) -> EvaluationOptions:
     """The measures' thresholds: those asked for, or the data's custom."""
     custom = KITTI_BAD_PX if family.startswith("kitti") else EvaluationOptions().bad_threshold
-    return EvaluationOptions(bad_threshold=custom if bad_threshold is None else bad_threshold)
+    return EvaluationOptions(
+        bad_threshold=custom if bad_threshold is None else bad_threshold, posterior_samples=posterior_samples
+    )
 
 
 def evaluate_set(

@@ -45,6 +45,28 @@ class Ours(Method):
         solution = self.solve(frame.disparity, frame.confidence, frame.gradient, frame.image)
         return MethodOutput(disparity=solution.disparity.astype(np.float32))
 
+    def deviation(self, frame: EvaluationFrame, samples: int) -> NDArray[np.float32]:
+        """The posterior's standard deviation in pixels, of the exact form; sampling takes a solve each."""
+        if frame.confidence is None or frame.gradient is None:
+            raise ValueError(
+                f"{self.label} needs {', '.join(self.missing(frame))}; frame {frame.name} has none"
+            )
+        return self.sample(frame.disparity, frame.confidence, frame.gradient, frame.image, samples)
+
+    def sample(
+        self,
+        disparity: NDArray[np.float32],
+        confidence: NDArray[np.float32],
+        gradient: NDArray[np.float32],
+        image: NDArray[np.uint8],
+        samples: int,
+    ) -> NDArray[np.float32]:
+        """`refine.posterior.posterior_deviation` with this method's parameters, the confidence shaped."""
+        from refine.posterior import posterior_deviation  # brings numba along
+
+        shaped = self.shape.apply(confidence)
+        return posterior_deviation(disparity, shaped, gradient, image, self.parameters, samples)
+
     def solve(
         self,
         disparity: NDArray[np.float32],

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from refine.mrf import MRFSolution
     from training.predict import Prediction
 
+POSTERIOR_SAMPLES = 32
+"""For --deviation: each pixel's deviation is off by an eighth of itself."""
+
 
 @dataclass(frozen=True)
 class Refine:
@@ -50,6 +53,9 @@ class Refine:
     """The MRF's parameters, as `stereoforge tune` writes them."""
     form: Annotated[Literal["exact", "paper"] | None, shown("exact|paper", "as validated, else exact")] = None
     """exact minimises the energy; paper solves the paper's eq. 8 as printed."""
+    deviation: bool = False
+    """Also write deviation.pfm, the refined disparity's standard deviation in pixels under the MRF's own Gaussian (of
+    the exact form): its order, least sure last, is what it is good for. Takes 32 more solves."""
     device: Annotated[str, shown("NAME")] = "cpu"
     """What the networks run on: cpu, cuda, ..."""
 
@@ -72,7 +78,12 @@ class Refine:
         assert prediction.confidence is not None
         assert prediction.gradient is not None
         solution = ours.solve(prediction.disparity, prediction.confidence, prediction.gradient, left)
-        self._write(left, prediction, solution)
+        deviation = None
+        if self.deviation:
+            deviation = ours.sample(
+                prediction.disparity, prediction.confidence, prediction.gradient, left, POSTERIOR_SAMPLES
+            )
+        self._write(left, prediction, solution, deviation)
         for note in notes:
             console.print(note, markup=False)
         console.print(
@@ -87,7 +98,13 @@ class Refine:
         if self.disparity_right is not None and self.disparity is None:
             raise UsageError("--disparity-right goes with --disparity")
 
-    def _write(self, left: NDArray[np.uint8], prediction: Prediction, solution: MRFSolution) -> None:
+    def _write(
+        self,
+        left: NDArray[np.uint8],
+        prediction: Prediction,
+        solution: MRFSolution,
+        deviation: NDArray[np.float32] | None,
+    ) -> None:
         from datagen.formats import write_gradient, write_pfm, write_png
         from datagen.ground_truth import gradient_validity
         from refine.overview import overview_picture
@@ -100,6 +117,8 @@ class Refine:
         write_pfm(self.out / "disparity.pfm", refined)
         write_pfm(self.out / "disparity_initial.pfm", prediction.disparity)
         write_pfm(self.out / "confidence.pfm", prediction.confidence)
+        if deviation is not None:
+            write_pfm(self.out / "deviation.pfm", deviation)
         write_gradient(self.out / "gradient.exr", prediction.gradient, inside)
-        picture = overview_picture(left, prediction.disparity, prediction.confidence, refined)
+        picture = overview_picture(left, prediction.disparity, prediction.confidence, refined, deviation)
         write_png(self.out / "overview.png", picture)

@@ -9,14 +9,21 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from refine import refine_disparity
+from refine import MRFParameters, refine_disparity
 from refine.baselines.gradnet import GradNet
 from refine.baselines.ours import Ours
 from refine.baselines.ours_conf_gt import OursConfGT
 from refine.baselines.regressor import Regressor
 from refine.evaluation import EvaluationFrame, EvaluationOptions, evaluate
 from refine.methods import Method, MethodOutput, default_methods, known_methods
-from refine.metrics import bad_pixel_rate, end_point_error, forward_gradient, gradient_error
+from refine.metrics import (
+    bad_pixel_rate,
+    end_point_error,
+    forward_gradient,
+    gradient_error,
+    sparsification_curve,
+)
+from refine.posterior import posterior_deviation
 from tests.refine.worlds import toy_frame
 
 MAIN_ROWS = default_methods(("regressor", "gradnet", "ours", "ours_conf_gt"))
@@ -162,6 +169,26 @@ def test_other_confidences_are_compared():
     assert list(aucs) == ["confnet", "oracle", "contrary", "random", "optimal"]
     assert aucs["optimal"] == pytest.approx(aucs["oracle"], abs=2e-3)
     assert aucs["oracle"] <= aucs["confnet"] < aucs["random"] < aucs["contrary"]
+
+
+def test_the_posterior_is_judged_on_the_refined_disparity():
+    """An area a test computes from the deviations by itself; the initial disparity's areas stay what they were."""
+    frame = toy_frame(0, 30, 40)
+    ours, samples = Ours(MRFParameters(alpha=5.0)), 8
+    plain = evaluate([frame], [ours]).frames[0]
+    sampled = evaluate([frame], [ours], EvaluationOptions(posterior_samples=samples)).frames[0]
+    assert plain.refined_aucs == {}
+    assert sampled.aucs == plain.aucs
+    assert list(sampled.refined_aucs) == ["posterior", "confnet", "random", "optimal"]
+    refined = ours.run(frame).disparity
+    deviation = posterior_deviation(
+        frame.disparity, frame.confidence, frame.gradient, frame.image, MRFParameters(alpha=5.0), samples
+    )
+    curve = sparsification_curve(refined, frame.truth, -deviation)
+    assert sampled.refined_aucs["posterior"] == pytest.approx(curve.auc)
+    bad = np.mean(np.abs(refined - frame.truth) > 1)
+    assert sampled.refined_aucs["random"] == pytest.approx(bad)
+    assert sampled.refined_aucs["optimal"] < sampled.refined_aucs["posterior"] < bad
 
 
 def test_conf_gt_trusts_exactly_the_right_pixels(monkeypatch):

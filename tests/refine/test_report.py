@@ -11,7 +11,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from refine.evaluation import evaluate
+from refine.evaluation import EvaluationOptions, evaluate
 from refine.lens import most_improved_boundary, worst_boundary
 from refine.methods import default_methods
 from refine.overview import overview_picture
@@ -222,3 +222,20 @@ def test_the_overview_shows_four_pictures_of_the_pairs_shape():
     halves = np.array_split(picture[:, : picture.shape[1] // 2 * 2], 2, axis=1)
     cells = [cell for half in halves for cell in np.array_split(half[: half.shape[0] // 2 * 2], 2, axis=0)]
     assert all((cell != 255).mean() > 0.4 for cell in cells)
+    deviation = np.abs(frame.disparity - frame.truth)
+    taller = overview_picture(frame.image, frame.disparity, frame.confidence, frame.truth, deviation)
+    assert taller.shape[0] == pytest.approx(1.5 * picture.shape[0], rel=0.02)
+    assert (taller[picture.shape[0] :, : picture.shape[1] // 2] != 255).mean() > 0.4
+
+
+def test_areas_of_the_refined_disparity_are_a_table_and_rows_of_their_own(tmp_path):
+    frames = [toy_frame(seed, 24, 32) for seed in (0, 1)]
+    sampled = evaluate(frames, MAIN_ROWS, EvaluationOptions(posterior_samples=4))
+    files = write_report([EvaluatedSet("toys", sampled)], tmp_path)
+    mean = np.mean([frame.refined_aucs["posterior"] for frame in sampled.frames])
+    stored = json.loads(files.json.read_text())["sets"][0]["refined_confidences"]["posterior"]["auc"]
+    assert stored == pytest.approx(mean)
+    page = files.html.read_text()
+    assert "Posterior deviation" in page
+    assert "The same of the refined disparity" in page
+    assert f"{mean:.4f}" in page

@@ -37,6 +37,20 @@ def refine(folder: Path, out: Path, *more: str | Path, code: int = 0) -> None:
     assert int(end.value.code or 0) == code
 
 
+def test_the_deviation_is_a_file_and_leaves_the_disparity_alone(world, tmp_path):
+    folder, _ = world
+    words = ("--disparity", folder / "given.pfm")
+    refine(folder, tmp_path / "plain", *words)
+    refine(folder, tmp_path / "more", *words, "--deviation")
+    assert not (tmp_path / "plain" / "deviation.pfm").exists()
+    deviation = read_pfm(tmp_path / "more" / "deviation.pfm")
+    assert deviation.shape == (64, 128)
+    assert (deviation > 0).all()
+    assert deviation[22:28, 45:55].mean() > 1.2 * np.median(deviation)  # the hole
+    same = (read_pfm(tmp_path / name / "disparity.pfm") for name in ("plain", "more"))
+    np.testing.assert_array_equal(*same)
+
+
 @pytest.mark.parametrize(
     "source",
     [
