@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from datagen.errors import DatasetError
 from datagen.ground_truth import VISIBLE
 from datagen.raycast import SceneRayCaster
-from datagen.scene_geometry import SceneGeometry
 from datagen.statistics import textured_share
 
 TEXTURELESS = "textureless"
@@ -54,13 +53,13 @@ class Curation:
             )
 
 
-def fault_before_rendering(geometry: SceneGeometry, curation: Curation) -> str | None:
+def fault_before_rendering(caster: SceneRayCaster, curation: Curation) -> str | None:
     """What is wrong with the scene's first or last frame, in a word or two; None if nothing is."""
     if not curation.enabled:
         return None
-    caster = SceneRayCaster(geometry)
-    for frame in sorted({0, geometry.scene.frames - 1}):
-        for fault in _faults(caster, geometry, curation, frame):
+    # The first frame last: it is the one that the caster will be asked for next.
+    for frame in sorted({0, caster.geometry.scene.frames - 1}, reverse=True):
+        for fault in _faults(caster, curation, frame):
             return fault
     return None
 
@@ -70,14 +69,15 @@ def is_textureless(image: NDArray[np.uint8], curation: Curation) -> bool:
     return curation.enabled and textured_share(image) < curation.min_textured
 
 
-def _faults(caster: SceneRayCaster, geometry: SceneGeometry, curation: Curation, frame: int) -> Iterator[str]:
-    camera = geometry.scene.camera
+def _faults(caster: SceneRayCaster, curation: Curation, frame: int) -> Iterator[str]:
+    scene = caster.geometry.scene
+    camera = scene.camera
     step = max(1, camera.width // RAYS_ACROSS)
     rows, columns = (
         grid.ravel() for grid in np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
     )
     hits = caster.cast("left", frame, rows, columns)
-    counts = np.bincount(hits.object_index, minlength=len(geometry.scene.objects) + 1) / len(rows)
+    counts = np.bincount(hits.object_index, minlength=len(scene.objects) + 1) / len(rows)
     from_behind = caster.sees_back(frame, rows, columns)
     inner = np.bincount(hits.object_index[from_behind], minlength=len(counts)) / len(rows)
     if inner.max() > curation.max_inside:

@@ -86,13 +86,13 @@ def render_frames(
     scratch: Path,
     options: RenderOptions | None = None,
     watch: Stopwatch | None = None,
-    geometry: SceneGeometry | None = None,
+    caster: SceneRayCaster | None = None,
 ) -> Generator[tuple[int, dict[Eye, EyeTargets]], None, None]:
     """Yield (frame, both eyes' arrays) for every frame of a scene, frames counted from 0.
 
     scratch: an existing folder for Blender's temporary files and, outside worker processes, its log.
-    geometry: the scene's, if it has been built already. Blender keeps one world a process, so one iterator at
-    a time. Raises BlenderError, and RuntimeError on a Python without bpy.
+    caster: at the scene's meshes, if they have been built already. Blender keeps one world a process, so one
+    iterator at a time. Raises BlenderError, and RuntimeError on a Python without bpy.
     """
     # Imported here so that planning, verifying and training work on a Python without Blender.
     from datagen.blender.build import build_world
@@ -105,10 +105,10 @@ def render_frames(
     exposure: float | None = None
     try:
         with watch.step("build"), quiet(log):
-            geometry = geometry or SceneGeometry(scene)
+            caster = caster or SceneRayCaster(SceneGeometry(scene))
             settings = CyclesSettings(options.samples, options.device, options.threads)
-            world = build_world(geometry, start_empty_file(settings))
-        caster, sensor = SceneRayCaster(geometry), Sensor(scene)
+            world = build_world(caster.geometry, start_empty_file(settings))
+        sensor = Sensor(scene)
         extra_targets = ExtraTargets(caster, options.targets)
         for frame in range(scene.frames):
             with watch.step("render"), quiet(log):

@@ -1,12 +1,10 @@
-"""What ground truth means: labels, forward-difference gradients, the rays of a rectified pair.
+"""What ground truth means: labels, forward-difference gradients.
 
 Pure functions of arrays. Camera frame: x right, y up, looking along -z; pixel (row i, column j) is seen
 through its centre (j + 0.5, i + 0.5); the principal point is the image's middle.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,20 +38,3 @@ def gradient_validity(gradient: NDArray[np.float32], threshold_px: float) -> NDA
     valid[:, -1] = False
     valid[-1, :] = False
     return valid
-
-
-@dataclass(frozen=True)
-class RectifiedPair:
-    """The intrinsics the two eyes share."""
-
-    width: int
-    height: int
-    focal_px: float
-    baseline_m: float
-
-    def rays(self) -> NDArray[np.float64]:
-        """(H, W, 3) directions through the pixel centres with unit length along the optical axis."""
-        x = (np.arange(self.width) + 0.5 - self.width / 2) / self.focal_px
-        y = -(np.arange(self.height) + 0.5 - self.height / 2) / self.focal_px
-        grid_x, grid_y = np.meshgrid(x, y)
-        return np.stack([grid_x, grid_y, np.full_like(grid_x, -1.0)], axis=-1)

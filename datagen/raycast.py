@@ -13,7 +13,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE, RectifiedPair
+from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
 from datagen.layout import Eye
 from datagen.scene_geometry import SceneGeometry
 
@@ -58,19 +58,19 @@ class SceneRayCaster:
 
         Embree finds the triangle in 32 bits; the distance to its plane is then computed in 64 bits.
         """
-        camera = self._scene.camera
         directions = self._directions(rows, columns)
         disparity, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
-        hidden = np.zeros(len(directions), bool)
+        labels = np.full(len(directions), VISIBLE, np.uint8)
         if len(self.geometry.triangles):
             self._place(time_frames)
             own, other = self._eyes(eye)
             disparity, index = self._first_hits(own, directions)
-            hidden = self._hidden(own, other, directions, disparity)
-        x_other = columns + 0.5 + (-disparity if eye == "left" else disparity)
-        outside = (x_other < 0) | (x_other > camera.width)
-        labels = np.where(outside, OUT_OF_FRAME, np.where(hidden, OCCLUDED, VISIBLE))
-        return Hits(disparity, index, labels.astype(np.uint8))
+            x_other = columns + 0.5 + (-disparity if eye == "left" else disparity)
+            inside = (x_other >= 0) & (x_other <= self._scene.camera.width)
+            labels[~inside] = OUT_OF_FRAME
+            hidden = self._hidden(own, other, directions[inside], disparity[inside])
+            labels[inside] = np.where(hidden, OCCLUDED, VISIBLE)
+        return Hits(disparity, index, labels)
 
     def cast_all(self, eye: Eye, time_frames: float) -> Hits:
         """First hits through the centres of all pixels, each field (H, W)."""
@@ -113,9 +113,11 @@ class SceneRayCaster:
         return back
 
     def _directions(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
+        """(N, 3) through the pixels' centres, of unit length along the optical axis."""
         camera = self._scene.camera
-        pair = RectifiedPair(camera.width, camera.height, camera.focal_px, camera.baseline_m)
-        return pair.rays()[rows, columns]
+        x = (columns + 0.5 - camera.width / 2) / camera.focal_px
+        y = -(rows + 0.5 - camera.height / 2) / camera.focal_px
+        return np.stack([x, y, np.full_like(x, -1.0)], axis=-1)
 
     def _eyes(self, eye: Eye) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Where this eye and the other one are in the left eye's frame."""
@@ -129,17 +131,28 @@ class SceneRayCaster:
     def _first_hits(
         self, origin: NDArray[np.float64], directions: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """(N,) disparity and object index."""
         hit = self._nearest(origin, directions)
         met = hit >= 0
-        corners = self._vertices[self.geometry.triangles[hit[met]]] - origin
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        # depth = n.v / n.r with a ray r of unit length along the axis, and disparity = fB / depth.
-        along = np.einsum("ij,ij->i", normals, directions[met])
+        # Far fewer triangles are seen than pixels; each tells once what it shows.
+        seen = np.zeros(len(self.geometry.triangles), bool)
+        seen[hit[met]] = True
+        place = (np.cumsum(seen) - 1)[hit[met]]
+        planes = self._disparity_planes(np.flatnonzero(seen), origin)
         disparity, index = np.zeros(len(hit)), np.zeros(len(hit), np.int64)
-        distance = np.einsum("ij,ij->i", normals, corners[:, 0])
-        disparity[met] = self._scene.camera.disparity_metres * along / distance
+        disparity[met] = np.einsum("ij,ij->i", planes[place], directions[met])
         index[met] = 1 + self.geometry.owners[hit[met]]
         return disparity, index
+
+    def _disparity_planes(
+        self, triangles: NDArray[np.intp], origin: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(K, 3) p for each triangle such that a ray r of unit length along the axis sees it at disparity p.r."""
+        corners = self._vertices[self.geometry.triangles[triangles]] - origin
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        # depth = n.v / n.r, and disparity = fB / depth.
+        distance = np.einsum("ij,ij->i", normals, corners[:, 0])
+        return self._scene.camera.disparity_metres * normals / distance[:, None]
 
     def _hidden(
         self,
@@ -152,7 +165,8 @@ class SceneRayCaster:
         from both eyes."""
         sky = disparity == 0
         depth = self._scene.camera.disparity_metres / np.where(sky, 1.0, disparity)
-        towards = np.where(sky[:, None], directions, own + depth[:, None] * directions - other)
+        towards = directions * depth[:, None]
+        towards[~sky] += own - other
         return self._run(other, towards, "OCCLUDED", np.where(sky, _FAR, 1 - SAME_SURFACE)) == 0
 
     def _run(

@@ -29,6 +29,7 @@ from datagen.frames import BLENDER_LOG, EyeTargets, RenderOptions, Stopwatch, re
 from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME
 from datagen.layout import FIRST_FRAME, RENDER_PASSES, Direction, Eye, Layout
 from datagen.manifest import SceneManifest, file_entry, write_manifest
+from datagen.raycast import SceneRayCaster
 from datagen.recipe import Recipe
 from datagen.scene_geometry import SceneGeometry
 from datagen.staging import StagingArea
@@ -78,12 +79,13 @@ def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, 
     rejected: Counter[str] = Counter()
     for attempt in range(job.recipe.curation.attempts):
         with watch.step("sample"):
-            geometry = SceneGeometry(job.recipe.sample(job.split, job.scene, attempt))
-            fault = fault_before_rendering(geometry, job.recipe.curation)
-        frames = None if fault else _render_attempt(job, staging, geometry, watch)
+            scene = job.recipe.sample(job.split, job.scene, attempt)
+            caster = SceneRayCaster(SceneGeometry(scene))
+            fault = fault_before_rendering(caster, job.recipe.curation)
+        frames = None if fault else _render_attempt(job, staging, caster, watch)
         if frames is not None:
-            statistics = _scene_statistics(geometry.scene, frames, rejected)
-            return statistics | {"assets": _assets_used(job.recipe, geometry.scene)}
+            statistics = _scene_statistics(scene, frames, rejected)
+            return statistics | {"assets": _assets_used(job.recipe, scene)}
         rejected[fault or TEXTURELESS] += 1
     reasons = ", ".join(f"{reason} ({count})" for reason, count in rejected.most_common())
     raise DatasetError(
@@ -92,15 +94,15 @@ def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, 
 
 
 def _render_attempt(
-    job: SceneJob, staging: Path, geometry: SceneGeometry, watch: Stopwatch
+    job: SceneJob, staging: Path, caster: SceneRayCaster, watch: Stopwatch
 ) -> list[dict[str, float]] | None:
     """Render and stage a scene; its frames' statistics, or None if its first picture is textureless."""
-    recipe, staged = job.recipe, Layout(staging)
+    recipe, staged, scene = job.recipe, Layout(staging), caster.geometry.scene
     options = RenderOptions(
         recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets, recipe.passes
     )
     statistics: list[dict[str, float]] = []
-    with closing(render_frames(geometry.scene, staging, options, watch, geometry)) as frames:
+    with closing(render_frames(scene, staging, options, watch, caster)) as frames:
         for frame, targets in frames:
             if frame == 0 and is_textureless(next(iter(targets["left"].images.values())), recipe.curation):
                 return None
@@ -109,7 +111,7 @@ def _render_attempt(
                     _write_eye(staged, job, eye, FIRST_FRAME + frame, arrays)
                 statistics.append(_frame_statistics(targets["left"]))
     with watch.step("write"):
-        _write_scene_files(staged, job, geometry.scene)
+        _write_scene_files(staged, job, scene)
     (staging / BLENDER_LOG).unlink(missing_ok=True)
     return statistics
 

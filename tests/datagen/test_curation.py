@@ -13,6 +13,7 @@ from datagen.curation import Curation, fault_before_rendering, is_textureless
 from datagen.dataset import read_scene
 from datagen.layout import Layout
 from datagen.manifest import read_manifest
+from datagen.raycast import SceneRayCaster
 from datagen.scene_geometry import SceneGeometry
 from scenes import FAMILIES, Scene, scene_to_json
 from scenes.shapes.basic import Box
@@ -25,7 +26,7 @@ WALL = Plate((0.0, 0.0), 20.0, (60.0, 60.0))
 
 
 def fault(scene: Scene, curation: Curation = CURATION) -> str | None:
-    return fault_before_rendering(SceneGeometry(scene), curation)
+    return fault_before_rendering(SceneRayCaster(SceneGeometry(scene)), curation)
 
 
 def test_an_ordinary_scene_has_no_fault() -> None:
@@ -89,10 +90,10 @@ def test_rejected_scenes_are_drawn_anew_and_counted(tmp_path: Path) -> None:
     first = recipe(max_one_object=0.999)
     shares = []
     for attempt in range(6):
-        geometry = SceneGeometry(first.sample("train", 0, attempt))
+        caster = SceneRayCaster(SceneGeometry(first.sample("train", 0, attempt)))
         bounds = np.linspace(0.2, 1.0, 81)
         passing = [
-            b for b in bounds if not fault_before_rendering(geometry, replace(CURATION, max_one_object=b))
+            b for b in bounds if not fault_before_rendering(caster, replace(CURATION, max_one_object=b))
         ]
         shares.append(min(passing, default=1.0))
     best = int(np.argmin(shares))
