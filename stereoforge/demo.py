@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rich.table import Table
@@ -14,13 +14,17 @@ from datagen import Recipe
 from datagen.gallery import write_gallery
 from refine.evaluation import Evaluation
 from scenes.families.flying_things import FlyingThingsConfig
-from stereoforge.evaluation import evaluate_set, open_test_data, report_evaluation
-from stereoforge.prediction import open_predictors
+from refine.results import EvaluatedSet
+from stereoforge.evaluation import TestData, describe_networks, evaluate_set, open_test_data, report_evaluation
+from stereoforge.prediction import open_predictors, open_settings
 from stereoforge.progress import console
 from stereoforge.rendering import render_all
+from stereoforge.shipped import SHIPPED_WEIGHTS
 from training.train import train
 
 NETWORKS = ("regressor", "confnet", "gradnet", "regressor_f")
+SHIPPED_METHODS = ("regressor", "gradnet", "ours", "ours_conf_gt")
+"""What is run with the shipped networks, to show what more training brings."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,9 @@ class DemoResult:
     gallery: Path
     report: Path
     evaluation: Evaluation
+    """Of the networks trained here."""
+    shipped: Evaluation
+    """Of the networks that come with StereoForge, on the same frames."""
     minutes: float
 
 
@@ -68,11 +75,21 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
     (test,) = open_test_data([str(data)], "test")
     with _stage(f"refining and evaluating {len(test.frames)} test pairs"):
         evaluated = evaluate_set(test, open_predictors(weights))
+    with _stage("the same with the networks that come with StereoForge"):
+        shipped = _evaluate_shipped(test)
     minutes = (time.monotonic() - started) / 60
     files = report_evaluation(
-        [evaluated], weights, out / "report", limits=_limits(plan, minutes), title="StereoForge demo"
+        [evaluated, shipped], weights, out / "report", limits=_limits(plan, minutes), title="StereoForge demo"
     )
-    return DemoResult(data, weights, gallery, files.html, evaluated.evaluation, minutes)
+    return DemoResult(data, weights, gallery, files.html, evaluated.evaluation, shipped.evaluation, minutes)
+
+
+def _evaluate_shipped(test: TestData) -> EvaluatedSet:
+    """The shipped networks, with the parameters chosen for them, on the demo's test frames."""
+    rows = open_settings(None, SHIPPED_WEIGHTS).rows(SHIPPED_METHODS)
+    facts = {**test.facts, "Networks": "shipped: " + "; ".join(describe_networks(SHIPPED_WEIGHTS))}
+    named = replace(test, name=f"{test.name}, shipped networks", facts=facts)
+    return evaluate_set(named, open_predictors(SHIPPED_WEIGHTS), rows)
 
 
 @contextmanager
@@ -99,9 +116,9 @@ def _limits(plan: DemoPlan, minutes: float) -> tuple[str, ...]:
     )
 
 
-def summary_table(evaluation: Evaluation) -> Table:
+def summary_table(evaluation: Evaluation, title: str) -> Table:
     """The main numbers for the terminal."""
-    table = Table(title="test set", title_justify="left")
+    table = Table(title=title, title_justify="left")
     for heading in (
         "method",
         "bad > 1 px, all",

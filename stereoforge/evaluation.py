@@ -106,7 +106,7 @@ def report_evaluation(
     """Write the report, saying what was evaluated with what; the arguments are those of `ReportContext`."""
     context = ReportContext(
         title=title,
-        facts={"Weights": "; ".join(_describe_networks(weights)), **(facts or {})},
+        facts={"Weights": "; ".join(describe_networks(weights)), **(facts or {})},
         limits=limits,
         bootstrap_seed=bootstrap_seed,
         sections=sections,
@@ -124,7 +124,8 @@ def describe_settings(settings: Settings) -> str:
     return f"chosen on {frames} validation frames of {data}"
 
 
-def _describe_networks(weights: Path) -> Iterator[str]:
+def describe_networks(weights: Path) -> Iterator[str]:
+    """A phrase for each network of a run folder."""
     for task in TASKS:
         if has_weights(weights, task):
             summary = read_summary(weights, task)

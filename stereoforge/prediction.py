@@ -18,7 +18,7 @@ from refine.evaluation import EvaluationFrame
 from refine.forest import Forest, load_forest
 from refine.handmade import consistency_confidence, local_slopes
 from refine.settings import Settings, read_settings
-from stereoforge.errors import CommandError, UsageError
+from stereoforge.errors import CommandError
 from training.predict import FreePredictor, Prediction, StereoPredictor
 from training.weights import has_weights
 
@@ -36,9 +36,9 @@ class PairPredictor(Protocol):
 
 @dataclass(frozen=True)
 class MatchingPredictor:
-    """Semi-global matching, or a given disparity, with the networks that need no regressor, or without any."""
+    """Semi-global matching, or a given disparity, with the networks that need no regressor, or without them."""
 
-    networks: FreePredictor | None
+    networks: FreePredictor
     matcher: SGBMParameters
 
     def predict(self, left: Image, right: Image) -> Prediction:
@@ -57,10 +57,8 @@ class MatchingPredictor:
 
     def judge(self, left: Image, disparity: Map, disparity_right: Map) -> Prediction:
         """Confidence and gradients by the networks there are, else by hand; holes are filled from the background."""
-        confidence = gradient = None
-        if self.networks is not None:
-            judged = self.networks.predict(left, disparity, disparity_right)
-            confidence, gradient = judged.confidence, judged.gradient
+        judged = self.networks.predict(left, disparity, disparity_right)
+        confidence, gradient = judged.confidence, judged.gradient
         if confidence is None:
             consistency = left_right_consistency(disparity, disparity_right)
             confidence = consistency_confidence(disparity, consistency, left)
@@ -140,22 +138,21 @@ def forest_file(run: Path) -> Path:
 
 
 def open_matching(
-    run: Path | None, device: str = "cpu", matcher: SGBMParameters | None = None
+    run: Path, device: str = "cpu", matcher: SGBMParameters | None = None
 ) -> MatchingPredictor:
-    """Semi-global matching with the networks of a run folder that need no regressor, if there is one."""
-    return MatchingPredictor(None if run is None else FreePredictor(run, device), matcher or SGBMParameters())
+    """Semi-global matching with those networks of a run folder that need no regressor."""
+    return MatchingPredictor(FreePredictor(run, device), matcher or SGBMParameters())
 
 
-def fallback_notes(run: Path | None) -> list[str]:
+def fallback_notes(run: Path) -> list[str]:
     """A sentence for each network that a foreign disparity has to do without."""
-    where = "no run folder was given" if run is None else f"{run} has none"
     notes = []
     for task, instead in (
         ("confnet_free", "confidence is taken from left-right consistency and texture"),
         ("gradnet_free", "slopes are taken from the disparity itself"),
     ):
-        if run is None or not has_weights(run, task):
-            notes.append(f"without a {task} ({where}), {instead}")
+        if not has_weights(run, task):
+            notes.append(f"without a {task} ({run} has none), {instead}")
     return notes
 
 
@@ -163,7 +160,7 @@ def predict_pair(
     left: Image,
     right: Image,
     given: tuple[Map, Map | None] | None,
-    run: Path | None,
+    run: Path,
     device: str,
     predictor: PredictorName,
 ) -> tuple[Prediction, list[str]]:
@@ -173,7 +170,6 @@ def predict_pair(
         given: The left view's disparity and perhaps the right view's, instead of a predictor.
 
     Raises:
-        UsageError: Networks are asked for, and no run folder is given.
         CommandError: The run folder lacks a network.
         TrainingError: Anything wrong with the run folder, or with the images.
     """
@@ -186,10 +182,6 @@ def predict_pair(
         matching = open_matching(run, device)
         answer = matching.predict(left, right) if given is None else matching.predict_for(left, right, *given)
         return answer, fallback_notes(run)
-    if run is None:
-        raise UsageError(
-            "refine needs --weights, or a disparity from elsewhere: --disparity or --predictor sgbm"
-        )
     answer = StereoPredictor(run, device).predict(left, right)
     for name, found in (("confnet", answer.confidence), ("gradnet", answer.gradient)):
         if found is None:
@@ -202,10 +194,10 @@ def parameters_file(run: Path, predictor: PredictorName = "networks") -> Path:
     return run / ("parameters.json" if predictor == "networks" else f"parameters_{predictor}.json")
 
 
-def open_settings(file: Path | None, run: Path | None, predictor: PredictorName = "networks") -> Settings:
+def open_settings(file: Path | None, run: Path, predictor: PredictorName = "networks") -> Settings:
     """The methods' parameters: of the file, or of the one in the run folder, or the defaults."""
     if file is not None:
         return read_settings(file)
-    if run is not None and parameters_file(run, predictor).exists():
+    if parameters_file(run, predictor).exists():
         return read_settings(parameters_file(run, predictor))
     return Settings()

@@ -24,7 +24,8 @@ class Demo:
         from stereoforge.demo import run_demo, summary_table
 
         result = run_demo(self.out)
-        console.print(summary_table(result.evaluation))
+        console.print(summary_table(result.evaluation, "networks trained just now"))
+        console.print(summary_table(result.shipped, "networks that come with StereoForge, same frames"))
         console.print(
             f"Made in {result.minutes:.1f} minutes: a toy by its training, the real thing in every step.\n"
             f"  pictures of the data set   {result.gallery}\n"

@@ -12,6 +12,7 @@ import tyro
 
 from stereoforge.errors import UsageError
 from stereoforge.progress import console
+from stereoforge.shipped import SHIPPED_WEIGHTS
 from stereoforge.values import parse_methods, shown
 
 
@@ -25,10 +26,10 @@ class Evaluate:
 
     data: Annotated[tyro.conf.Positional[tuple[str, ...]], shown("DATA")]
     """Data sets: folders or URLs, with FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
-    weights: Annotated[Path, shown("RUN")]
-    """Run folder of the networks."""
     out: Annotated[Path, shown("REPORT")]
     """Folder for the report."""
+    weights: Annotated[Path, shown("RUN", "the shipped networks")] = SHIPPED_WEIGHTS
+    """Run folder of the networks."""
     split: Literal["train", "val", "test"] = "test"
     """Which split of the data sets; those without splits are taken whole."""
     methods: Annotated[str, shown("LIST", "all there are")] = ""

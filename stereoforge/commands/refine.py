@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stereoforge.errors import UsageError
 from stereoforge.images import read_color_image
 from stereoforge.progress import console
+from stereoforge.shipped import SHIPPED_WEIGHTS
 from stereoforge.values import shown
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class Refine:
     """Right picture, rectified and of the same size."""
     out: Annotated[Path, shown("DIR")]
     """Folder for the results."""
-    weights: Annotated[Path | None, shown("RUN", "none")] = None
+    weights: Annotated[Path, shown("RUN", "the shipped networks")] = SHIPPED_WEIGHTS
     """Run folder with a regressor, a confnet and a gradnet; for a disparity from elsewhere, with a confnet_free and a
     gradnet_free."""
     disparity: Annotated[Path | None, shown("FILE", "none")] = None

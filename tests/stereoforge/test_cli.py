@@ -115,6 +115,19 @@ def test_the_demo_leaves_what_it_promises(demo: tuple[Path, DemoResult]) -> None
         (result.weights / f"{name}.safetensors").is_file() for name in ("regressor", "confnet", "gradnet")
     )
     assert result.evaluation.scores["ours"].regions["all"].epe > 0
+    assert set(numbers["sets"][1]["methods"]) == {"regressor", "gradnet", "ours", "ours_conf_gt"}
+    shipped, own = (each.scores["regressor"].regions["all"].epe for each in (result.shipped, result.evaluation))
+    assert shipped < own  # three steps of training against hours
+
+
+@pytest.mark.slow
+def test_the_shipped_networks_refine_a_pair(demo: tuple[Path, DemoResult], tmp_path: Path) -> None:
+    out, _ = demo
+    pair = [next(out.glob(f"data/frames_cleanpass/TEST/A/0000/{eye}/*.png")) for eye in ("left", "right")]
+    assert run("refine", *pair, "--out", tmp_path / "r") == 0
+    truth = read_pfm(next(out.glob("data/disparity/TEST/A/0000/left/*.pfm")))
+    refined = read_pfm(tmp_path / "r" / "disparity.pfm")
+    assert np.abs(refined - truth).mean() < 0.5 * np.abs(truth - np.median(truth)).mean()
 
 
 @pytest.mark.slow

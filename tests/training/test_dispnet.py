@@ -157,6 +157,21 @@ def test_prediction_scale_multiplies_every_prediction() -> None:
     torch.testing.assert_close(second.features[:, -1:], 16 * first.features[:, -1:])
 
 
+def test_residual_predictions_add_to_the_coarser_one() -> None:
+    """With prediction layers of zero, every scale of a residual network repeats the coarsest, upsampled."""
+    torch.manual_seed(4)
+    network = DispNetCorr1D(DispNetConfig(width=0.125, residual=True)).eval()
+    for stage in (network.stage5, network.stage4, network.stage3, network.stage2, network.stage1):
+        nn.init.zeros_(stage.pr.weight)
+    left, right = torch.rand(2, 1, 3, 128, 128)
+    with torch.no_grad():
+        coarsest, *finer = network(left, right).disparities
+    for disparity in finer:
+        expected = nn.functional.interpolate(coarsest, scale_factor=2, mode="bilinear", align_corners=False)
+        torch.testing.assert_close(disparity, expected)
+        coarsest = expected
+
+
 def test_small_network_fits_its_size() -> None:
     network = DispNetCorr1D(DispNetConfig(width=0.25, one_sided=True, normalization="batch"))
     assert sum(tensor.numel() for tensor in network.state_dict().values()) * 4 <= 12e6

@@ -36,6 +36,9 @@ class DispNetConfig:
     prediction_scale: float = 1.0
     """Pixels a unit of a prediction layer's output stands for. The original predicts pixels directly (1); a
     larger value lets a run of few steps reach tens of pixels with weights of ordinary size (ours)."""
+    residual: bool = False
+    """Predict at each scale what is to be added to the coarser scale's prediction, upsampled bilinearly, instead of
+    the disparity anew (ours; cascaded and FADNet-like networks do so)."""
 
 
 class DispNetOutput(NamedTuple):
@@ -75,8 +78,10 @@ def upsampling(in_channels: int, channels: int) -> nn.ConvTranspose2d:
 class ExpandingStage(nn.Module):
     """One step of the decoder: upsample features and prediction, join the skip, predict at twice the size."""
 
-    def __init__(self, below: int, skip: int, channels: int, normalization: Normalization) -> None:
+    def __init__(self, below: int, skip: int, channels: int, config: DispNetConfig) -> None:
         super().__init__()
+        normalization = config.normalization
+        self.residual = config.residual
         self.upconv = activated(upsampling(below, channels), channels, normalization)
         self.uppr = upsampling(1, 1)
         joined = skip + channels + 1
@@ -87,7 +92,10 @@ class ExpandingStage(nn.Module):
         upsampled = in_full_precision(self.uppr, prediction)
         joined = torch.cat([skip, self.upconv(below), upsampled], dim=1)
         features = self.iconv(joined)
-        return features, in_full_precision(self.pr, features), joined
+        finer = in_full_precision(self.pr, features)
+        if self.residual:
+            finer = finer + full_resolution(prediction, finer.shape[-2:])
+        return features, finer, joined
 
 
 class DispNetCorr1D(nn.Module):
@@ -122,11 +130,11 @@ class DispNetCorr1D(nn.Module):
         self.conv6 = conv(c512, c1024, 3, 2)
         self.conv6_1 = conv(c1024, c1024, 3, 1)
         self.pr6 = nn.Conv2d(c1024, 1, 3, 1, 1)
-        self.stage5 = ExpandingStage(c1024, c512, c512, config.normalization)
-        self.stage4 = ExpandingStage(c512, c512, c256, config.normalization)
-        self.stage3 = ExpandingStage(c256, c256, c128, config.normalization)
-        self.stage2 = ExpandingStage(c128, c128, c64, config.normalization)
-        self.stage1 = ExpandingStage(c64, c64, c32, config.normalization)
+        self.stage5 = ExpandingStage(c1024, c512, c512, config)
+        self.stage4 = ExpandingStage(c512, c512, c256, config)
+        self.stage3 = ExpandingStage(c256, c256, c128, config)
+        self.stage2 = ExpandingStage(c128, c128, c64, config)
+        self.stage1 = ExpandingStage(c64, c64, c32, config)
         self.feature_channels = c64 + c32 + 1
         self.register_buffer("image_mean", torch.full((3,), 0.4))
         initialize(self)

@@ -1,0 +1,167 @@
+"""The small presets' open choices, one changed at a time, with equal budgets on the same validation frames.
+
+    python -m benchmarks.ablations --data DATASET --out DIR [--steps 1500] [--head-steps 600] [--only NAME ...]
+    python -m benchmarks.ablations --out DIR --table        # what is finished so far, as Markdown
+
+Each row trains one network from the same seed; heads stand on `--regressor RUN`, or on the group `regressor`'s own
+`base`. A row that is finished is not trained again, so a stopped comparison continues. The figures are those of the
+kept (best) weights on the data set's val split, which the test sets share nothing with.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from training.presets import (
+    SMALL_CONFNET,
+    SMALL_GRADNET,
+    SMALL_REGRESSOR,
+    STAGE_WEIGHTS,
+    AugmentationConfig,
+    Preset,
+    RegressorPreset,
+)
+from training.train import train
+
+FINEST_ONLY = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+EVEN = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+
+
+def _staged(steps: int) -> dict[str, Any]:
+    """The published schedule of loss weights, compressed: each stage but the last a tenth of the run."""
+    return {"loss_stages": STAGE_WEIGHTS, "stage_ends": tuple(steps * k // 10 for k in range(1, 7))}
+
+
+def regressors() -> dict[str, Preset]:
+    base = SMALL_REGRESSOR
+    network, optimizer = base.network, base.optimizer
+
+    def other_network(**changes: Any) -> RegressorPreset:
+        return replace(base, network=replace(network, **changes))
+
+    def other_optimizer(**changes: Any) -> RegressorPreset:
+        return replace(base, optimizer=replace(optimizer, **changes))
+
+    return {
+        "base": base,
+        "residual": other_network(residual=not network.residual),
+        "no normalisation, rate 4e-4": replace(
+            base,
+            network=replace(network, normalization="none"),
+            optimizer=replace(optimizer, learning_rate=4e-4),
+        ),
+        "predictions in px": other_network(prediction_scale=1.0),
+        "two-sided correlation": other_network(one_sided=False),
+        "rate 2e-3": other_optimizer(learning_rate=2e-3),
+        "rate 5e-4": other_optimizer(learning_rate=5e-4),
+        "no warm-up": other_optimizer(warmup_steps=0),
+        "no clipping": other_optimizer(clip_norm=None),
+        "published loss stages, compressed": replace(base, **_staged(base.steps)),
+        "all scales alike": replace(base, loss_stages=(EVEN,)),
+        "finest scale only": replace(base, loss_stages=(FINEST_ONLY,)),
+        "moving average 0.998": replace(base, ema_decay=0.998),
+        "published augmentation": replace(base, augmentation=AugmentationConfig(horizontal_flip=0.5)),
+        "no flips": replace(base, augmentation=replace(base.augmentation, horizontal_flip=0.0)),
+        "width 0.375": other_network(width=0.375),
+    }
+
+
+def confnets() -> dict[str, Preset]:
+    base = SMALL_CONFNET
+    return {
+        "base": base,
+        "full resolution": replace(base, network=replace(base.network, half_resolution=False)),
+        "dropout 0.5": replace(base, network=replace(base.network, dropout=0.5)),
+        "no dropout": replace(base, network=replace(base.network, dropout=0.0)),
+        "no normalisation": replace(base, network=replace(base.network, normalization="none")),
+        "dilations 1, 2, 4, 4": replace(base, network=replace(base.network, dilations=(1, 2, 4, 4))),
+        "width 64": replace(base, network=replace(base.network, width=64, hidden=128)),
+    }
+
+
+def gradnets() -> dict[str, Preset]:
+    base = SMALL_GRADNET
+    return {
+        "base": base,
+        "full resolution": replace(base, network=replace(base.network, half_resolution=False)),
+        "dropout 0.2": replace(base, network=replace(base.network, dropout=0.2)),
+        "no normalisation": replace(base, network=replace(base.network, normalization="none")),
+        "dilations 1, 2, 4, 4": replace(base, network=replace(base.network, dilations=(1, 2, 4, 4))),
+        "width 64": replace(base, network=replace(base.network, width=64, hidden=128)),
+        "mask above 2 px": replace(base, gradient_threshold_px=2.0),
+        "mask above 5 px": replace(base, gradient_threshold_px=5.0),
+    }
+
+
+GROUPS = {"regressor": regressors, "confnet": confnets, "gradnet": gradnets}
+
+
+def run(task: str, name: str, preset: Preset, options: argparse.Namespace) -> None:
+    folder = options.out / task / name.replace(" ", "_").replace(",", "")
+    finished = folder / "ablation.json"
+    if finished.exists():
+        return
+    steps = options.steps if task == "regressor" else options.head_steps
+    preset = replace(preset, validation_interval=max(1, steps // 4))
+    init = None if task == "regressor" else options.regressor or options.out / "regressor" / "base"
+    began = time.perf_counter()
+    summary = train(
+        task, [(options.data, 1.0)], folder, preset, init=init, steps=steps, seed=options.seed,
+        device="cpu", resume=True,
+    )  # fmt: skip
+    row = {
+        "name": name,
+        "steps": steps,
+        "seconds": round(time.perf_counter() - began, 1),
+        **summary.validation,
+    }
+    finished.write_text(json.dumps(row, indent=2) + "\n", encoding="utf-8")
+    print(task, row, flush=True)
+
+
+def table(task: str, names: list[str], out: Path) -> str:
+    """Markdown of the finished rows, in the order they are defined."""
+    rows = []
+    for name in names:
+        file = out / task / name.replace(" ", "_").replace(",", "") / "ablation.json"
+        if file.exists():
+            rows.append(json.loads(file.read_text(encoding="utf-8")))
+    if not rows:
+        return f"{task}: nothing finished"
+    figures = [key for key in rows[0] if key not in ("name", "steps")]
+    lines = [f"| {task}, {rows[0]['steps']} steps | {' | '.join(figures)} |", "|---" * (len(figures) + 1) + "|"]
+    for row in rows:
+        values = (f"{row[key]:.0f}" if key == "seconds" else f"{row[key]:.3f}" for key in figures)
+        lines.append(f"| {row['name']} | {' | '.join(values)} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--data", type=Path)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--regressor", type=Path, help="run folder the heads stand on")
+    parser.add_argument("--steps", type=int, default=1500)
+    parser.add_argument("--head-steps", type=int, default=600)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", nargs="*", default=(), help="group or group:row")
+    parser.add_argument("--table", action="store_true")
+    options = parser.parse_args()
+    for task, presets in GROUPS.items():
+        known = presets()
+        if not options.table:
+            for name, preset in known.items():
+                if not options.only or task in options.only or f"{task}:{name}" in options.only:
+                    run(task, name, preset, options)
+        print(f"\n{table(task, list(known), options.out)}")
+
+
+if __name__ == "__main__":
+    main()
