@@ -134,7 +134,10 @@ def table(task: str, names: list[str], out: Path) -> str:
     if not rows:
         return f"{task}: nothing finished"
     figures = [key for key in rows[0] if key not in ("name", "steps")]
-    lines = [f"| {task}, {rows[0]['steps']} steps | {' | '.join(figures)} |", "|---" * (len(figures) + 1) + "|"]
+    lines = [
+        f"| {task}, {rows[0]['steps']} steps | {' | '.join(figures)} |",
+        "|---" * (len(figures) + 1) + "|",
+    ]
     for row in rows:
         values = (f"{row[key]:.0f}" if key == "seconds" else f"{row[key]:.3f}" for key in figures)
         lines.append(f"| {row['name']} | {' | '.join(values)} |")

@@ -13,9 +13,17 @@ from rich.table import Table
 from datagen import Recipe
 from datagen.gallery import write_gallery
 from refine.evaluation import Evaluation
-from scenes.families.flying_things import FlyingThingsConfig
 from refine.results import EvaluatedSet
-from stereoforge.evaluation import TestData, describe_networks, evaluate_set, open_test_data, report_evaluation
+from refine.settings import Settings
+from scenes.families.flying_things import FlyingThingsConfig
+from stereoforge.evaluation import (
+    TestData,
+    describe_networks,
+    describe_settings,
+    evaluate_set,
+    open_test_data,
+    report_evaluation,
+)
 from stereoforge.prediction import open_predictors, open_settings
 from stereoforge.progress import console
 from stereoforge.rendering import render_all
@@ -73,23 +81,29 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
         with _stage(f"training the {network}, {plan.steps[network]} steps"):
             train(network, [(data, 1.0)], weights, "tiny", steps=plan.steps[network], resume=True)
     (test,) = open_test_data([str(data)], "test")
+    # There is no time to choose parameters here; the shipped ones were chosen on a validation set of such worlds.
+    settings = open_settings(None, SHIPPED_WEIGHTS)
     with _stage(f"refining and evaluating {len(test.frames)} test pairs"):
-        evaluated = evaluate_set(test, open_predictors(weights))
+        evaluated = evaluate_set(test, open_predictors(weights), settings.rows())
     with _stage("the same with the networks that come with StereoForge"):
-        shipped = _evaluate_shipped(test)
+        shipped = _evaluate_shipped(test, settings)
     minutes = (time.monotonic() - started) / 60
     files = report_evaluation(
-        [evaluated, shipped], weights, out / "report", limits=_limits(plan, minutes), title="StereoForge demo"
+        [evaluated, shipped],
+        weights,
+        out / "report",
+        limits=_limits(plan, minutes),
+        title="StereoForge demo",
+        facts={"Parameters": describe_settings(settings)},
     )
     return DemoResult(data, weights, gallery, files.html, evaluated.evaluation, shipped.evaluation, minutes)
 
 
-def _evaluate_shipped(test: TestData) -> EvaluatedSet:
-    """The shipped networks, with the parameters chosen for them, on the demo's test frames."""
-    rows = open_settings(None, SHIPPED_WEIGHTS).rows(SHIPPED_METHODS)
+def _evaluate_shipped(test: TestData, settings: Settings) -> EvaluatedSet:
+    """The shipped networks on the demo's test frames."""
     facts = {**test.facts, "Networks": "shipped: " + "; ".join(describe_networks(SHIPPED_WEIGHTS))}
     named = replace(test, name=f"{test.name}, shipped networks", facts=facts)
-    return evaluate_set(named, open_predictors(SHIPPED_WEIGHTS), rows)
+    return evaluate_set(named, open_predictors(SHIPPED_WEIGHTS), settings.rows(SHIPPED_METHODS))
 
 
 @contextmanager

@@ -137,9 +137,7 @@ def forest_file(run: Path) -> Path:
     return run / "rdf.safetensors"
 
 
-def open_matching(
-    run: Path, device: str = "cpu", matcher: SGBMParameters | None = None
-) -> MatchingPredictor:
+def open_matching(run: Path, device: str = "cpu", matcher: SGBMParameters | None = None) -> MatchingPredictor:
     """Semi-global matching with those networks of a run folder that need no regressor."""
     return MatchingPredictor(FreePredictor(run, device), matcher or SGBMParameters())
 

@@ -116,7 +116,9 @@ def test_the_demo_leaves_what_it_promises(demo: tuple[Path, DemoResult]) -> None
     )
     assert result.evaluation.scores["ours"].regions["all"].epe > 0
     assert set(numbers["sets"][1]["methods"]) == {"regressor", "gradnet", "ours", "ours_conf_gt"}
-    shipped, own = (each.scores["regressor"].regions["all"].epe for each in (result.shipped, result.evaluation))
+    shipped, own = (
+        each.scores["regressor"].regions["all"].epe for each in (result.shipped, result.evaluation)
+    )
     assert shipped < own  # three steps of training against hours
 
 
