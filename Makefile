@@ -30,6 +30,7 @@ demo: .venv/.installed
 study: .venv/.installed
 	$(BIN)/stereoforge study --plan recipes/study.yaml --out $(STUDY)
 	rm -rf results && cp -R $(STUDY)/results results
+	@echo "the networks: $(STUDY)/runs; those in weights/ are of the flying_things there"
 
 test: .venv/.installed-dev
 	OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest $(PYTEST_FLAGS)

@@ -31,6 +31,7 @@ from stereoforge.study.statistics import describe, read_statistics, write_statis
 from stereoforge.tuning import VALIDATION, Tuning, validation_frames
 from stereoforge.tuning import describe as describe_tuning
 from storage import write_bytes
+from training.model_card import write_model_card
 from training.presets import Preset, find_preset
 from training.train import train
 
@@ -266,6 +267,7 @@ class _Study:
             _collect(self.networks[name], folder)
             if name in self.tuning:
                 write_bytes(parameters_file(folder), parameters_file(self.tuning[name].folder).read_bytes())
+            write_model_card(folder)
 
         return {
             name: make_job(
