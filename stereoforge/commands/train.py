@@ -99,7 +99,7 @@ class Train:
             changes=self._changes(),
             pseudo=self.pseudo,
             init=self.init,
-            refinement=open_settings(None, self.init).ours if self.task == "joint" else None,
+            refinement=open_settings(None, self.init).ours if self.task == "joint" and self.init else None,
             resume=self.resume,
             steps=self.steps,
             seed=self.seed,
