@@ -37,6 +37,8 @@ class DomainPlan:
     """Scenes of each split; those of the training splits are rendered only where something is trained on them."""
     steps: dict[str, int] = field(default_factory=dict)
     """Training steps of each network; the preset's where none are given."""
+    methods: tuple[str, ...] = ()
+    """Rows of the subject's tables on this domain; empty for the study's."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,8 @@ class StudyPlan:
                 f"there is no forest of the preset {self.preset!r}; there are {', '.join(PLANS)}"
             )
         try:
-            default_methods(self.methods)
+            for methods in (self.methods, *(domain.methods for domain in self.domains.values())):
+                default_methods(methods)
         except ValueError as error:
             raise UsageError(f"methods: {error}") from error
 

@@ -248,13 +248,13 @@ class _Study:
             predictors = open_predictors(collected, self.device)
             frames = validation_frames([open_source(data.source)], predictors, count)
             about = describe_tuning(frames, [data.source], "balanced")
-            Tuning(frames, parameters_file(folder), about).run(self._methods(name))
+            Tuning(frames, parameters_file(folder), about).run(self._tuned_methods(name))
 
         settings = {
             "networks": {task: job.key for task, job in jobs.items()},
             "frames": count,
             "data": data.key,
-            "methods": list(self._methods(name)),
+            "methods": list(self._tuned_methods(name)),
         }
         title = f"choosing the methods' parameters on {count} frames of {name}"
         return make_job(self.out / "parameters", name, title, settings, count * TUNING_SECONDS, run)
@@ -289,7 +289,7 @@ class _Study:
         """By (trained on, tested on)."""
         return {
             (name, test): self._evaluation_job(
-                self.runs[name], f"{name}-on-{test}", test, self._methods(name)
+                self.runs[name], f"{name}-on-{test}", test, self._methods(name, test)
             )
             for name in self.plan.train
             for test in self.plan.test
@@ -333,8 +333,12 @@ class _Study:
         seconds = 4 * scenes * FRAME_SECONDS[len(methods) > len(REFERENCE_METHODS)]
         return make_job(self.out / "evaluations", name, f"evaluating {name}", settings, seconds, evaluate)
 
-    def _methods(self, name: str) -> tuple[str, ...]:
+    def _tuned_methods(self, name: str) -> tuple[str, ...]:
         return (self.plan.methods or table_order()) if name == self.plan.subject else REFERENCE_METHODS
+
+    def _methods(self, name: str, test: str) -> tuple[str, ...]:
+        own = self.plan.domains[test].methods if name == self.plan.subject else ()
+        return own or self._tuned_methods(name)
 
 
 DATASET = "set"
