@@ -13,6 +13,7 @@ import pytest
 
 from datagen.curation import fault_before_rendering
 from datagen.formats import write_pfm, write_png
+from datagen.raycast import SceneRayCaster
 from datagen.recipe import Recipe
 from datagen.scene_geometry import SceneGeometry
 from refine.methods import EvaluationFrame
@@ -44,7 +45,9 @@ def test_the_family_samples_worlds_that_can_be_rendered(monkeypatch: pytest.Monk
     assert scene_from_json(scene_to_json(scenes[0])) == scenes[0]
     assert 10 <= len(scenes[0].objects) - 1 <= 30
     curation = Recipe(config, {"train": 1}).curation
-    assert any(fault_before_rendering(SceneGeometry(scene), curation) is None for scene in scenes)
+    assert any(
+        fault_before_rendering(SceneRayCaster(SceneGeometry(scene)), curation) is None for scene in scenes
+    )
 
 
 def test_the_shape_is_closed_and_faces_outwards(monkeypatch: pytest.MonkeyPatch) -> None:
