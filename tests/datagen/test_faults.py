@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -140,8 +141,9 @@ def children_of(pid: int) -> list[int]:
 
 @pytest.mark.slow
 def test_ctrl_c_leaves_whole_scenes_and_nothing_else(small_reference: Path, tmp_path: Path) -> None:
-    root, temporary = tmp_path / "set", tmp_path / "temporary"
-    temporary.mkdir()
+    root = tmp_path / "set"
+    # Short, since sockets are made in it, whose paths may have 107 characters.
+    temporary = Path(tempfile.mkdtemp())
     write_recipe(tmp_path / "recipe.yaml", RECIPE)
     command = [sys.executable, "-m", "stereoforge", "render", "--recipe", str(tmp_path / "recipe.yaml")]
     process = subprocess.Popen(
@@ -164,7 +166,7 @@ def test_ctrl_c_leaves_whole_scenes_and_nothing_else(small_reference: Path, tmp_
     while any(Path(f"/proc/{pid}").exists() for pid in workers) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert not [pid for pid in workers if Path(f"/proc/{pid}").exists()]
-    assert list(temporary.iterdir()) == []
+    temporary.rmdir()  # nothing is left in it
     assert not (root / STAGING_FOLDER).exists()
     done = hashes(root)
     assert done.items() <= hashes(small_reference).items()
