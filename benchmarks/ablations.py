@@ -23,6 +23,8 @@ from training.presets import (
     SMALL_REGRESSOR,
     STAGE_WEIGHTS,
     AugmentationConfig,
+    ConfNetPreset,
+    GradNetPreset,
     Preset,
     RegressorPreset,
 )
@@ -71,28 +73,27 @@ def regressors() -> dict[str, Preset]:
     }
 
 
-def confnets() -> dict[str, Preset]:
-    base = SMALL_CONFNET
-    return {
-        "base": base,
-        "full resolution": replace(base, network=replace(base.network, half_resolution=False)),
-        "dropout 0.5": replace(base, network=replace(base.network, dropout=0.5)),
-        "no dropout": replace(base, network=replace(base.network, dropout=0.0)),
-        "no normalisation": replace(base, network=replace(base.network, normalization="none")),
-        "dilations 1, 2, 4, 4": replace(base, network=replace(base.network, dilations=(1, 2, 4, 4))),
-        "width 64": replace(base, network=replace(base.network, width=64, hidden=128)),
+def heads(base: ConfNetPreset | GradNetPreset, dropouts: dict[str, float]) -> dict[str, Preset]:
+    """What both heads are compared in; `dropouts` are further rows by their names."""
+    changes: dict[str, dict[str, Any]] = {
+        "full resolution": {"half_resolution": False},
+        **{name: {"dropout": value} for name, value in dropouts.items()},
+        "no normalisation": {"normalization": "none"},
+        "dilations 1, 2, 4, 4": {"dilations": (1, 2, 4, 4)},
+        "width 64": {"width": 64, "hidden": 128},
     }
+    rows = {name: replace(base, network=replace(base.network, **change)) for name, change in changes.items()}
+    return {"base": base, **rows}
+
+
+def confnets() -> dict[str, Preset]:
+    return heads(SMALL_CONFNET, {"dropout 0.5": 0.5, "no dropout": 0.0})
 
 
 def gradnets() -> dict[str, Preset]:
     base = SMALL_GRADNET
     return {
-        "base": base,
-        "full resolution": replace(base, network=replace(base.network, half_resolution=False)),
-        "dropout 0.2": replace(base, network=replace(base.network, dropout=0.2)),
-        "no normalisation": replace(base, network=replace(base.network, normalization="none")),
-        "dilations 1, 2, 4, 4": replace(base, network=replace(base.network, dilations=(1, 2, 4, 4))),
-        "width 64": replace(base, network=replace(base.network, width=64, hidden=128)),
+        **heads(base, {"dropout 0.2": 0.2}),
         "mask above 2 px": replace(base, gradient_threshold_px=2.0),
         "mask above 5 px": replace(base, gradient_threshold_px=5.0),
     }

@@ -172,11 +172,11 @@ def check_vectors(
     )
 
 
-def check_boundaries(marked: NDArray[np.bool_], expected: NDArray[np.bool_]) -> Iterator[str]:
-    """Motion boundaries are those that flow and object index make."""
-    wrong = int((marked != expected).sum())
+def check_derived(values: NDArray[Any], expected: NDArray[Any], origin: str) -> Iterator[str]:
+    """A target (H, W) is what follows from others; `origin` names those."""
+    wrong = int((values != expected).sum())
     if wrong:
-        yield f"{wrong} pixels are marked otherwise than optical flow and object index say"
+        yield f"{wrong} pixels are marked otherwise than {origin} say"
 
 
 def _in_other_view(

@@ -71,11 +71,7 @@ def is_textureless(image: NDArray[np.uint8], curation: Curation) -> bool:
 
 def _faults(caster: SceneRayCaster, curation: Curation, frame: int) -> Iterator[str]:
     scene = caster.geometry.scene
-    camera = scene.camera
-    step = max(1, camera.width // RAYS_ACROSS)
-    rows, columns = (
-        grid.ravel() for grid in np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
-    )
+    rows, columns = caster.coarse_pixels(RAYS_ACROSS)
     hits = caster.cast("left", frame, rows, columns)
     counts = np.bincount(hits.object_index, minlength=len(scene.objects) + 1) / len(rows)
     from_behind = caster.sees_back(frame, rows, columns)

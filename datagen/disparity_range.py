@@ -23,11 +23,8 @@ REACHED_PERCENT = 99.5
 def with_greatest_disparity(scene: Scene, greatest_px: float) -> Scene:
     """The scene with the baseline at which its near surfaces have `greatest_px`; unchanged if it shows only sky."""
     camera = scene.camera
-    step = max(1, camera.width // RAYS_ACROSS)
-    rows, columns = (
-        grid.ravel() for grid in np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
-    )
     caster = SceneRayCaster(SceneGeometry(scene))
+    rows, columns = caster.coarse_pixels(RAYS_ACROSS)
     seen = [caster.cast("left", frame, rows, columns) for frame in sorted({0, scene.frames - 1})]
     disparity = np.concatenate([hits.disparity[hits.object_index > 0] for hits in seen])
     if not len(disparity):

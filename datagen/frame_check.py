@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.checks import (
-    check_boundaries,
+    check_derived,
     check_disparity,
     check_geometry,
     check_gradient,
@@ -23,7 +23,7 @@ from datagen.dataset import StereoSample
 from datagen.layout import DIRECTIONS, EYES, FIRST_FRAME, RENDER_PASSES, Direction, Eye
 from datagen.raycast import SceneRayCaster
 from datagen.recipe import Recipe
-from datagen.surface_targets import PixelSurfaces, motion_boundaries
+from datagen.surface_targets import PixelSurfaces, material_index, motion_boundaries
 from scenes import Scene
 
 NORMAL_TOLERANCE = 1e-4
@@ -106,9 +106,8 @@ class FrameCheck:
         instant = sample.frame - FIRST_FRAME
         surfaces = PixelSurfaces(self.caster, eye, instant, rows, columns)
         if "material_index" in kinds:
-            stored = sample.material_index(eye)[rows, columns].astype(np.float32)
-            expected = surfaces.materials().astype(np.float32)
-            for message in check_vectors(stored, expected, 0.0):
+            worn = material_index(self.scene, sample.view(eye).object_index)
+            for message in check_derived(sample.material_index(eye), worn, "the objects' materials"):
                 yield self._file("material_index", eye), message
         if "normals" in kinds:
             for message in check_vectors(
@@ -131,8 +130,8 @@ class FrameCheck:
             change = sample.disparity_change(eye, direction)[rows, columns]
             for message in check_vectors(change, surfaces.disparity_change(direction), MOTION_TOLERANCE_PX):
                 yield self._file("disparity_change", eye, direction), message
-        if "motion_boundaries" in kinds:
+        if "motion_boundaries" in kinds and flow is not None:
             marked = sample.motion_boundaries(eye, direction)
-            expected = None if flow is None else motion_boundaries(flow, sample.view(eye).object_index)
-            for message in () if expected is None else check_boundaries(marked, expected):
+            expected = motion_boundaries(flow, sample.view(eye).object_index)
+            for message in check_derived(marked, expected, "optical flow and object index"):
                 yield self._file("motion_boundaries", eye, direction), message

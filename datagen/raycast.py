@@ -58,7 +58,7 @@ class SceneRayCaster:
 
         Embree finds the triangle in 32 bits; the distance to its plane is then computed in 64 bits.
         """
-        directions = self._directions(rows, columns)
+        directions = self.directions(rows, columns)
         disparity, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
         labels = np.full(len(directions), VISIBLE, np.uint8)
         if len(self.geometry.triangles):
@@ -71,6 +71,13 @@ class SceneRayCaster:
             hidden = self._hidden(own, other, directions[inside], disparity[inside])
             labels[inside] = np.where(hidden, OCCLUDED, VISIBLE)
         return Hits(disparity, index, labels)
+
+    def coarse_pixels(self, across: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns of a regular grid of about so many pixels a row, for a look at the whole image."""
+        camera = self._scene.camera
+        step = max(1, camera.width // across)
+        grid = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
+        return grid[0].ravel(), grid[1].ravel()
 
     def cast_all(self, eye: Eye, time_frames: float) -> Hits:
         """First hits through the centres of all pixels, each field (H, W)."""
@@ -85,7 +92,7 @@ class SceneRayCaster:
         self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
     ) -> SurfacePoints:
         """What is seen through the centres of the pixels (rows, columns), both (N,)."""
-        directions = self._directions(rows, columns)
+        directions = self.directions(rows, columns)
         triangle, weights = np.full(len(directions), -1, np.int64), np.zeros((len(directions), 3))
         if len(self.geometry.triangles):
             self._place(time_frames)
@@ -105,14 +112,14 @@ class SceneRayCaster:
         """(N,) whether the left eye's pixels show a triangle from the side its corners run clockwise on."""
         points, directions = (
             self.surface_points("left", time_frames, rows, columns),
-            self._directions(rows, columns),
+            self.directions(rows, columns),
         )
         back = points.triangle >= 0
         a, b, c = np.moveaxis(self._vertices[self.geometry.triangles[points.triangle[back]]], 1, 0)
         back[back] = np.einsum("ij,ij->i", np.cross(b - a, c - a), directions[back]) > 0
         return back
 
-    def _directions(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
+    def directions(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
         """(N, 3) through the pixels' centres, of unit length along the optical axis."""
         camera = self._scene.camera
         x = (columns + 0.5 - camera.width / 2) / camera.focal_px

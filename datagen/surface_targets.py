@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from datagen.layout import DIRECTIONS, Direction, Eye
 from datagen.raycast import SceneRayCaster
+from scenes import Scene
 
 STEP: dict[Direction, int] = {"into_future": 1, "into_past": -1}
 """Frames from a pixel's instant to the one its point is followed to."""
@@ -40,23 +41,15 @@ class PixelSurfaces:
         columns: NDArray[np.intp],
     ) -> None:
         self._geometry, self._eye, self._time = caster.geometry, eye, time_frames
-        camera = caster.geometry.scene.camera
         self._shape = rows.shape
         rows, columns = rows.ravel(), columns.ravel()
         points = caster.surface_points(eye, time_frames, rows, columns)
         self._met = points.triangle >= 0
         self._corners = self._geometry.triangles[points.triangle[self._met]]
-        self._owners = self._geometry.owners[points.triangle[self._met]]
         self._weights = points.weights[self._met]
         self._centres = np.stack([columns, rows], -1) + 0.5
-        x, y = ((self._centres - (camera.width / 2, camera.height / 2)) / camera.focal_px).T
-        self._rays = np.stack([x, -y, np.full_like(x, -1.0)], -1)
+        self._rays = caster.directions(rows, columns)
         """Directions through the pixels' centres in the camera's frame (x right, y up, looking along -z)."""
-
-    def materials(self) -> NDArray[np.uint16]:
-        """(*S,) 0 for the sky, else 1 + the index in `Scene.materials`."""
-        worn = np.array([thing.material for thing in self._geometry.scene.objects])
-        return self._picture(1.0 + worn[self._owners], np.zeros(len(self._met))).astype(np.uint16)
 
     def normals(self) -> NDArray[np.float32]:
         """(*S, 3) unit normals of the triangles in the camera's frame, towards the eye; 0 for the sky."""
@@ -108,6 +101,12 @@ class PixelSurfaces:
         return picture.reshape(*self._shape, *sky.shape[1:]).astype(np.float32)
 
 
+def material_index(scene: Scene, object_index: NDArray[np.integer[Any]]) -> NDArray[np.uint16]:
+    """(H, W) 0 for the sky, else 1 + the index in `Scene.materials`, of what (H, W) objects wear."""
+    worn = [0, *(1 + thing.material for thing in scene.objects)]
+    return np.array(worn, np.uint16)[object_index]
+
+
 def motion_boundaries(flow: NDArray[np.float32], object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
     """(H, W) where two objects meet that move differently, by the (H, W, 2) flow of one direction."""
     marked = np.zeros(object_index.shape, bool)
@@ -135,12 +134,12 @@ class ExtraTargets:
     ) -> dict[tuple[str, Direction | None], NDArray[Any]]:
         """The arrays of one eye and frame, by kind and direction. object_index: (H, W), the frame's."""
         made: dict[tuple[str, Direction | None], NDArray[Any]] = {}
-        if not self._kinds:
+        if "material_index" in self._kinds:
+            made["material_index", None] = material_index(self._caster.geometry.scene, object_index)
+        if set(self._kinds) <= {"material_index"}:
             return made
         pixels = np.indices(object_index.shape)
         surfaces = PixelSurfaces(self._caster, eye, frame, pixels[0], pixels[1])
-        if "material_index" in self._kinds:
-            made["material_index", None] = surfaces.materials()
         if "normals" in self._kinds:
             made["normals", None] = surfaces.normals()
         for direction in DIRECTIONS:

@@ -229,7 +229,7 @@ class _Run:
             measures["confnet"] = frame.confidence
         threshold = self.options.bad_threshold
         bad = bad_pixel_rate(refined, frame.truth, threshold)
-        bounds = {"random": bad, "optimal": optimal_auc(bad) if np.isfinite(bad) else float("nan")}
+        bounds = {"random": bad, "optimal": _optimal_auc(bad)}
         return {
             name: sparsification_curve(refined, frame.truth, values, threshold).auc
             for name, values in measures.items()
@@ -250,6 +250,11 @@ class _Run:
             scene=frame.scene or frame.name,
             pools=pools,
             initial_bad=bad,
-            optimal_auc=optimal_auc(bad) if np.isfinite(bad) else float("nan"),
+            optimal_auc=_optimal_auc(bad),
             curves=curves,
         )
+
+
+def _optimal_auc(bad: float) -> float:
+    """The least possible area for a bad rate; NaN for a frame without ground truth, which has none."""
+    return optimal_auc(bad) if np.isfinite(bad) else float("nan")

@@ -38,20 +38,22 @@ class Ours(Method):
     tolerance: float = DEFAULT_TOLERANCE
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
-        if frame.confidence is None or frame.gradient is None:
-            raise ValueError(
-                f"{self.label} needs {', '.join(self.missing(frame))}; frame {frame.name} has none"
-            )
-        solution = self.solve(frame.disparity, frame.confidence, frame.gradient, frame.image)
+        solution = self.solve(*self._inputs(frame))
         return MethodOutput(disparity=solution.disparity.astype(np.float32))
 
     def deviation(self, frame: EvaluationFrame, samples: int) -> NDArray[np.float32]:
         """The posterior's standard deviation in pixels, of the exact form; sampling takes a solve each."""
+        return self.sample(*self._inputs(frame), samples)
+
+    def _inputs(
+        self, frame: EvaluationFrame
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
+        """What `solve` and `sample` take of a frame."""
         if frame.confidence is None or frame.gradient is None:
             raise ValueError(
                 f"{self.label} needs {', '.join(self.missing(frame))}; frame {frame.name} has none"
             )
-        return self.sample(frame.disparity, frame.confidence, frame.gradient, frame.image, samples)
+        return frame.disparity, frame.confidence, frame.gradient, frame.image
 
     def sample(
         self,
