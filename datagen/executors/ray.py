@@ -21,6 +21,8 @@ LOST_MACHINE_RETRIES = 10
 """How often Ray may run a job again whose machine or Ray worker is gone."""
 QUEUED_PER_SLOT = 2
 """Jobs given to Ray for each it can run at once: enough to keep it busy, few enough to be held anywhere."""
+CANCEL_ROUNDS, CANCEL_ROUND_S = 12, 5.0
+"""How often running jobs are asked to end, and how long each time may take, before they are left to Ray."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,7 @@ class RayExecutor:
                     for reference in done:
                         yield _outcome(running.pop(reference), reference)
             finally:
-                for reference in running:
-                    ray.cancel(reference, force=True)
+                _cancel(list(running))
 
     def _slots(self) -> int:
         """How many jobs the cluster as it is now can run at once."""
@@ -75,6 +76,22 @@ class RayExecutor:
         if self.gpus_per_job:
             slots = min(slots, int(resources.get("GPU", 0) // self.gpus_per_job))
         return max(1, slots if self.workers is None else min(slots, self.workers))
+
+
+def _cancel(references: list[Any]) -> None:
+    """End these tasks wherever they are.
+
+    A request that overtakes its task on the way to the worker is lost, and the task runs after all; so those
+    that have not ended are asked again.
+    """
+    import ray
+
+    for _ in range(CANCEL_ROUNDS):
+        for reference in references:
+            ray.cancel(reference, force=True)
+        if not references:
+            return
+        _, references = ray.wait(references, num_returns=len(references), timeout=CANCEL_ROUND_S)
 
 
 @contextmanager
