@@ -80,22 +80,26 @@ def _inside(t: NDArray[np.float64], nx: float, ny: float, nz: float, px: float, 
     return True
 
 
+@njit(cache=True)
 def segment_is_blocked(
     triangles: NDArray[np.float64], start: NDArray[np.float64], way: NDArray[np.float64], reach: float
 ) -> bool:
     """Whether any triangle (T, 3, 3) meets start + s way with 0 < s < reach (Moeller and Trumbore 1997)."""
-    first, along, across = (
-        triangles[:, 0],
-        triangles[:, 1] - triangles[:, 0],
-        triangles[:, 2] - triangles[:, 0],
-    )
-    p = np.cross(way, across)
-    determinant = np.einsum("ij,ij->i", along, p)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = 1 / determinant
-        t = start - first
-        u = np.einsum("ij,ij->i", t, p) * inverse
-        q = np.cross(t, along)
-        v = q @ way * inverse
-        s = np.einsum("ij,ij->i", across, q) * inverse
-        return bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (s > 0) & (s < reach)).any())
+    wx, wy, wz = way[0], way[1], way[2]
+    for k in range(triangles.shape[0]):
+        t = triangles[k]
+        ax, ay, az = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
+        bx, by, bz = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
+        tx, ty, tz = start[0] - t[0, 0], start[1] - t[0, 1], start[2] - t[0, 2]
+        px, py, pz = wy * bz - wz * by, wz * bx - wx * bz, wx * by - wy * bx
+        determinant = ax * px + ay * py + az * pz
+        if determinant == 0.0:
+            continue
+        u = (tx * px + ty * py + tz * pz) / determinant
+        if u < 0.0 or u > 1.0:
+            continue
+        qx, qy, qz = ty * az - tz * ay, tz * ax - tx * az, tx * ay - ty * ax
+        v = (wx * qx + wy * qy + wz * qz) / determinant
+        if v >= 0.0 and u + v <= 1.0 and 0.0 < (bx * qx + by * qy + bz * qz) / determinant < reach:
+            return True
+    return False

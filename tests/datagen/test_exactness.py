@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,53 +16,80 @@ from scipy.ndimage import map_coordinates
 from datagen.frames import EyeTargets, RenderOptions, render_frames
 from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
 from datagen.layout import EYES, Eye
+from datagen.raycast import Hits, SceneRayCaster
 from datagen.scene_geometry import SceneGeometry
 from scenes import FAMILIES, Scene, sample_scene
 from tests.datagen.oracle import cast_depth, segment_is_blocked, to_camera_frame
 
-SCENES: dict[str, tuple[tuple[int, int, int], ...]] = {
-    "flying_things": ((240, 136, 5), (160, 90, 5)),
-    "driving": ((240, 136, 2), (160, 90, 2)),
-    "monkaa": ((240, 136, 2), (160, 90, 2)),
-    "sintel": ((240, 136, 2), (160, 90, 2)),
-}
-"""Width, height and number of the scenes of each family."""
+MANY = ((240, 136, 5), (160, 90, 5))
+"""Width, height and number of the scenes of each family whose truth is compared with other rays."""
+FEW = ((240, 136, 2), (160, 90, 2))
+"""Those that are also rendered."""
 MORE_SCENES = int(os.environ.get("EXACTNESS_SCENES", "0"))
 """So many of each size instead, for figures worth quoting."""
 
 
 @dataclass(frozen=True)
 class World:
-    """One rendered scene with the triangles Blender saw."""
+    """The truth of one scene's first frame, and the triangles that Blender evaluated for it."""
+
+    scene: Scene
+    truth: dict[Eye, Hits]
+    triangles: NDArray[np.float64]
+
+    def seen_from(self, x_m: float) -> NDArray[np.float64]:
+        """(T, 3, 3) the triangles in the frame of an eye at x metres along the rig's axis; the left one is at 0."""
+        return to_camera_frame(self.triangles, self.scene.camera.pose("left", 0.0)) - (x_m, 0.0, 0.0)
+
+    def eye_at(self, eye: Eye) -> float:
+        return 0.0 if eye == "left" else self.scene.camera.baseline_m
+
+    def cast_depth(self, x_m: float, shift_px: float = 0.0) -> NDArray[np.float64]:
+        camera = self.scene.camera
+        return cast_depth(self.seen_from(x_m), camera.width, camera.height, camera.focal_px, shift_px)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One rendered scene."""
 
     scene: Scene
     targets: dict[Eye, EyeTargets]
-    triangles: NDArray[np.float64]
     cycles: NDArray[np.float64]
     """(H, W) disparity of the left eye by Cycles' depth pass."""
 
-    def cast_disparity(self, eye: Eye, shift_px: float = 0.0) -> NDArray[np.float64]:
-        camera = self.scene.camera
-        triangles = to_camera_frame(self.triangles, camera.pose(eye, 0.0))
-        depth = cast_depth(triangles, camera.width, camera.height, camera.focal_px, shift_px)
-        return camera.disparity_metres / depth
 
-
-@pytest.fixture(scope="module", params=sorted(SCENES))
-def worlds(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> list[World]:
-    """Random scenes of a family; their triangles are Blender's own evaluated meshes."""
-    made = []
-    for width, height, count in SCENES[request.param]:
+def scenes_of(family: str, sizes: tuple[tuple[int, int, int], ...]) -> Iterator[Scene]:
+    for width, height, count in sizes:
         for seed in range(MORE_SCENES or count):
-            config = FAMILIES[request.param].config(width=width, height=height)
-            scene = sample_scene(np.random.default_rng([seed, width]), request.param, config)
-            scratch = tmp_path_factory.mktemp("blender")
-            frames = render_frames(scene, scratch, RenderOptions(samples=4))
-            _, targets = next(frames)
-            from tests.datagen.blender_geometry import evaluated_triangles
+            config = FAMILIES[family].config(width=width, height=height)
+            yield sample_scene(np.random.default_rng([seed, width]), family, config)
 
-            made.append(World(scene, targets, evaluated_triangles(), cycles_disparity(scene, scratch)))
-            frames.close()
+
+@pytest.fixture(scope="module", params=sorted(FAMILIES))
+def worlds(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> list[World]:
+    """Random scenes of a family, built in Blender but not rendered."""
+    from datagen.blender.build import build_world, place
+    from datagen.blender.session import CyclesSettings, quiet, start_empty_file
+    from tests.datagen.blender_geometry import evaluated_triangles
+
+    made = []
+    for scene in scenes_of(request.param, MANY):
+        caster = SceneRayCaster(SceneGeometry(scene))
+        with quiet(tmp_path_factory.mktemp("blender") / "log"):
+            place(build_world(caster.geometry, start_empty_file(CyclesSettings(samples=1))), "left", 0.0)
+        made.append(World(scene, {eye: caster.cast_all(eye, 0.0) for eye in EYES}, evaluated_triangles()))
+    return made
+
+
+@pytest.fixture(scope="module", params=sorted(FAMILIES))
+def pictures(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> list[Picture]:
+    """A few random scenes of a family, rendered."""
+    made = []
+    for scene in scenes_of(request.param, FEW):
+        scratch = tmp_path_factory.mktemp("blender")
+        ((_, targets),) = render_frames(replace(scene, frames=1), scratch, RenderOptions(samples=4))
+        made.append(Picture(scene, targets, cycles_disparity(scene, scratch)))
     return made
 
 
@@ -82,11 +111,16 @@ def cycles_disparity(scene: Scene, scratch: Path) -> NDArray[np.float64]:
     return np.where(depth < 1e9, scene.camera.disparity_metres / depth, 0.0)  # 1e10 is the sky
 
 
-def errors(worlds: list[World], eye: Eye, shift_px: float = 0.0) -> NDArray[np.float64]:
-    """|rendered - cast| of every pixel of every world, px."""
-    return np.concatenate(
-        [np.abs(w.targets[eye].disparity - w.cast_disparity(eye, shift_px)).ravel() for w in worlds]
-    )
+def errors(
+    worlds: list[World], eye: Eye, *, seen_as: Eye | None = None, sign: float = 1.0, shift_px: float = 0.0
+) -> NDArray[np.float64]:
+    """|truth - cast| of every pixel of every world, px; the rays cast from a wrong place on request."""
+    found = []
+    for world in worlds:
+        depth = world.cast_depth(sign * world.eye_at(seen_as or eye), shift_px)
+        stored = world.truth[eye].disparity.astype(np.float32)
+        found.append(np.abs(stored - world.scene.camera.disparity_metres / depth).ravel())
+    return np.concatenate(found)
 
 
 @pytest.mark.slow
@@ -95,16 +129,78 @@ def test_disparity_equals_the_float64_ray_cast(worlds: list[World], eye: Eye) ->
     error = errors(worlds, eye)
     median, p999 = np.percentile(error, (50, 99.9))
     off = float((error > 0.1).mean())
-    print(f"{eye}: {error.size} px, median {median:.1e} px, p99.9 {p999:.1e} px, off by > 0.1 px {off:.1e}")
+    print(
+        f"{worlds[0].scene.family} {eye}: {len(worlds)} scenes, {error.size} px, median {median:.1e} px, "
+        f"p99.9 {p999:.1e} px, off by > 0.1 px {off:.1e}"
+    )
     assert median <= 1e-4
     assert p999 <= 5e-3
     assert off <= 1e-4
 
 
+MISTAKES: dict[str, tuple[Eye, dict[str, Any]]] = {
+    "left half a pixel left": ("left", {"shift_px": -0.5}),
+    "left half a pixel right": ("left", {"shift_px": 0.5}),
+    "right half a pixel left": ("right", {"shift_px": -0.5}),
+    "right half a pixel right": ("right", {"shift_px": 0.5}),
+    "right eye on the left": ("right", {"sign": -1.0}),
+    "right for left": ("left", {"seen_as": "right"}),
+    "left for right": ("right", {"seen_as": "left"}),
+}
+
+
 @pytest.mark.slow
-def test_cycles_shows_the_surfaces_that_the_truth_is_of(worlds: list[World]) -> None:
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_the_classical_mistakes_would_break_the_bars(worlds: list[World], mistake: str) -> None:
+    eye, wrongly = MISTAKES[mistake]
+    error = errors(worlds[:2], eye, **wrongly)
+    assert np.percentile(error, 99.9) > 1.0
+    assert (error > 0.1).mean() > 1e-3
+
+
+def wrong_labels(worlds: list[World], eye: Eye, sign: float = 1.0) -> tuple[int, int]:
+    """Of some pixels of every world, each against every triangle between it and the other eye: how many differ.
+
+    sign: -1 to look for the other eye on the wrong side.
+    """
+    rng = np.random.default_rng(1)
+    wrong = total = 0
+    for world in worlds:
+        camera, labels = world.scene.camera, world.truth[eye].occlusion
+        triangles = world.seen_from(world.eye_at(eye))
+        rows, columns = np.unravel_index(
+            rng.choice(np.flatnonzero(labels != OUT_OF_FRAME), 60, replace=False), labels.shape
+        )
+        depth = world.cast_depth(world.eye_at(eye))[rows, columns]
+        other = np.array([sign * (1.0 if eye == "left" else -1.0) * camera.baseline_m, 0.0, 0.0])
+        x, y = columns + 0.5 - camera.width / 2, camera.height / 2 - rows - 0.5
+        rays = np.stack([x / camera.focal_px, y / camera.focal_px, -np.ones(len(rows))], -1)
+        for ray, z, label in zip(rays, depth, labels[rows, columns], strict=True):
+            way, reach = (ray, np.inf) if np.isinf(z) else (z * ray - other, 1 - SAME_SURFACE)
+            wrong += segment_is_blocked(triangles, other, way, reach) != (label == OCCLUDED)
+            total += 1
+    return wrong, total
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("eye", EYES)
+def test_occlusion_equals_rays_in_double_precision(worlds: list[World], eye: Eye) -> None:
+    wrong, total = wrong_labels(worlds, eye)
+    print(f"{worlds[0].scene.family} {eye}: {wrong} of {total} labels differ")
+    assert wrong <= 0.002 * total
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("eye", EYES)
+def test_occlusion_from_the_wrong_side_would_be_seen(worlds: list[World], eye: Eye) -> None:
+    wrong, total = wrong_labels(worlds, eye, sign=-1.0)
+    assert wrong > 0.02 * total
+
+
+@pytest.mark.slow
+def test_cycles_shows_the_surfaces_that_the_truth_is_of(pictures: list[Picture]) -> None:
     """The pictures' own depth: near the centres and in 32 bits, so looser than the bars above."""
-    error = np.concatenate([np.abs(w.targets["left"].disparity - w.cycles).ravel() for w in worlds])
+    error = np.concatenate([np.abs(p.targets["left"].disparity - p.cycles).ravel() for p in pictures])
     median, p999 = np.percentile(error, (50, 99.9))
     off = float((error > 0.1).mean())
     print(f"Cycles: {error.size} px, median {median:.1e} px, p99.9 {p999:.1e} px, off by > 0.1 px {off:.1e}")
@@ -113,55 +209,18 @@ def test_cycles_shows_the_surfaces_that_the_truth_is_of(worlds: list[World]) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("eye", EYES)
-def test_occlusion_equals_rays_in_double_precision(worlds: list[World], eye: Eye) -> None:
-    """Some visible and hidden points of every world, each against every triangle between it and the other eye."""
-    rng = np.random.default_rng(1)
-    wrong = total = 0
-    for world in worlds:
-        targets, camera = world.targets[eye], world.scene.camera
-        triangles = to_camera_frame(world.triangles, camera.pose(eye, 0.0))
-        inside = np.flatnonzero(targets.occlusion.ravel() != OUT_OF_FRAME)
-        chosen = rng.choice(inside, 60, replace=False)
-        rows, columns = np.unravel_index(chosen, targets.occlusion.shape)
-        depth = cast_depth(triangles, camera.width, camera.height, camera.focal_px)[rows, columns]
-        sign = 1.0 if eye == "left" else -1.0
-        other = np.array([sign * camera.baseline_m, 0.0, 0.0])
-        rays = np.stack(
-            [
-                (columns + 0.5 - camera.width / 2) / camera.focal_px,
-                -(rows + 0.5 - camera.height / 2) / camera.focal_px,
-                -np.ones(len(rows)),
-            ],
-            -1,
-        )
-        for ray, z, label in zip(rays, depth, targets.occlusion[rows, columns], strict=True):
-            start, way = (other, ray) if np.isinf(z) else (other, z * ray - other)
-            reach = np.inf if np.isinf(z) else 1 - SAME_SURFACE
-            wrong += segment_is_blocked(triangles, start, way, reach) != (label == OCCLUDED)
-            total += 1
-    print(f"{eye}: {wrong} of {total} labels differ")
-    assert wrong <= 0.002 * total
+def test_what_is_rendered_is_what_is_compared_here(pictures: list[Picture]) -> None:
+    caster = SceneRayCaster(SceneGeometry(pictures[0].scene))
+    for eye in EYES:
+        hits, targets = caster.cast_all(eye, 0.0), pictures[0].targets[eye]
+        assert np.array_equal(targets.disparity, hits.disparity.astype(np.float32))
+        assert np.array_equal(targets.object_index, hits.object_index)
+        assert np.array_equal(targets.occlusion, hits.occlusion)
 
 
-@pytest.mark.slow
-def test_half_a_pixel_would_break_the_exactness_bars(worlds: list[World]) -> None:
-    error = errors(worlds, "left", shift_px=0.5)
-    assert np.percentile(error, 99.9) > 1.0
-    assert (error > 0.1).mean() > 1e-2
-
-
-@pytest.mark.slow
-def test_swapped_eyes_would_break_the_exactness_bars(worlds: list[World]) -> None:
-    error = np.concatenate(
-        [np.abs(w.targets["left"].disparity - w.cast_disparity("right")).ravel() for w in worlds]
-    )
-    assert np.percentile(error, 99.9) > 1.0
-
-
-def warp_error(world: World, shift_px: float = 0.0, sign: float = -1.0) -> NDArray[np.float64]:
+def warp_error(picture: Picture, shift_px: float = 0.0, sign: float = -1.0) -> NDArray[np.float64]:
     """(H, W) squared error, in levels, of the left picture against the right one sampled at x - d."""
-    left, right = world.targets["left"], world.targets["right"]
+    left, right = picture.targets["left"], picture.targets["right"]
     rows, columns = np.mgrid[: left.disparity.shape[0], : left.disparity.shape[1]].astype(float)
     where = [rows, columns + sign * left.disparity + shift_px]
     warped = np.stack(
@@ -179,13 +238,13 @@ def psnr(squared_errors: list[NDArray[np.float64]]) -> float:
 
 
 @pytest.mark.slow
-def test_warping_right_to_left_reproduces_it_where_visible(worlds: list[World]) -> None:
-    labels = [w.targets["left"].occlusion for w in worlds]
-    exact = [warp_error(w) for w in worlds]
+def test_warping_right_to_left_reproduces_it_where_visible(pictures: list[Picture]) -> None:
+    labels = [w.targets["left"].occlusion for w in pictures]
+    exact = [warp_error(w) for w in pictures]
     visible = psnr([e[m == VISIBLE] for e, m in zip(exact, labels, strict=True)])
     occluded = psnr([e[m == OCCLUDED] for e, m in zip(exact, labels, strict=True)])
-    half = psnr([warp_error(w, 0.5)[m == VISIBLE] for w, m in zip(worlds, labels, strict=True)])
-    wrong_sign = psnr([warp_error(w, sign=1.0)[m == VISIBLE] for w, m in zip(worlds, labels, strict=True)])
+    half = psnr([warp_error(w, 0.5)[m == VISIBLE] for w, m in zip(pictures, labels, strict=True)])
+    wrong_sign = psnr([warp_error(w, sign=1.0)[m == VISIBLE] for w, m in zip(pictures, labels, strict=True)])
     print(
         f"warp PSNR: visible {visible:.2f} dB, occluded {occluded:.2f} dB, "
         f"half a pixel off {half:.2f} dB, wrong sign {wrong_sign:.2f} dB"
@@ -198,12 +257,12 @@ def test_warping_right_to_left_reproduces_it_where_visible(worlds: list[World]) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("eye", EYES)
-def test_occlusion_agrees_with_the_other_eyes_disparity(worlds: list[World], eye: Eye) -> None:
+def test_occlusion_agrees_with_the_other_eyes_disparity(pictures: list[Picture], eye: Eye) -> None:
     """A visible point is seen at the same disparity by the other eye, an occluded one behind something nearer."""
     sign, other_eye = (-1.0, "right") if eye == "left" else (1.0, "left")
     visible_agrees, occluded_agrees = [], []
-    for world in worlds:
-        own, other = world.targets[eye], world.targets[other_eye]
+    for picture in pictures:
+        own, other = picture.targets[eye], picture.targets[other_eye]
         height, width = own.disparity.shape
         rows, columns = np.mgrid[:height, :width]
         x = columns + sign * own.disparity
@@ -217,7 +276,7 @@ def test_occlusion_agrees_with_the_other_eyes_disparity(worlds: list[World], eye
         occluded_agrees.append(nearer[own.occlusion == OCCLUDED])
     # What is seen or hides a point may be thinner than a pixel and lie between the centres that are compared here:
     # leaves and fences, which only some families are full of.
-    thin = worlds[0].scene.family != "flying_things"
+    thin = pictures[0].scene.family != "flying_things"
     visible, occluded = (float(np.concatenate(each).mean()) for each in (visible_agrees, occluded_agrees))
     print(f"{eye}: {visible:.2%} of visible, {occluded:.2%} of occluded points agree")
     assert visible > (0.97 if thin else 0.99)
