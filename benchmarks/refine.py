@@ -1,10 +1,12 @@
 """The MRF's solver beside its rivals: seconds, deviation from the direct solution, growth with size, memory.
 
-    python -m benchmarks.refine --data DATASET [--repeat 3] [--threads 2] [--skip-direct] [--large] [--crop 100]
+    python -m benchmarks.refine --data DATASET [--weights RUN] [--repeat 3] [--threads 2]
+        [--skip-direct] [--skip-sgbm] [--large] [--crop 100]
 
-Takes the first frame of a rendered data set. Until networks are trained on it, its inputs are made of real
-parts: OpenCV's SGBM with holes filled as initial disparity, its left-right agreement as confidence (0 over
-large areas), the true gradients with noise. "sparse" keeps one confident pixel in a hundred.
+Takes the first frame of a rendered data set. With --weights its disparity, confidence and gradient are what the run's
+networks predict. The harder cases are made of other real parts: OpenCV's SGBM with holes filled as initial disparity,
+its left-right agreement as confidence (0 over large areas), the true gradients with noise; "sparse" keeps one confident
+pixel in a hundred.
 
 Every rival solves the same arrays, weights and set-up included, in turn within each repetition; the table gives
 medians of wall clock and CPU. The rivals know one thread only; --threads is ours. pyamg comes with the development
@@ -52,6 +54,21 @@ def frame_inputs(root: Path, split: str) -> Inputs:
     gradient = forward_gradient(sample.disparity_left)
     gradient = np.where(np.abs(gradient) <= 1, gradient, 0) + rng.normal(0, 0.05, gradient.shape)
     return fill_background(found).astype(np.float64), confidence, gradient, left
+
+
+def predicted_inputs(root: Path, split: str, weights: Path) -> Inputs:
+    """The same frame with what trained networks make of it."""
+    from datagen import StereoDataset
+    from training.predict import StereoPredictor
+
+    sample = StereoDataset(root, split)[0]
+    found = StereoPredictor(weights).predict(sample.left, sample.right)
+    if found.confidence is None or found.gradient is None:
+        raise SystemExit(f"{weights} has no ConfNet or no GradNet")
+    disparity, confidence, gradient = (
+        values.astype(np.float64) for values in (found.disparity, found.confidence, found.gradient)
+    )
+    return disparity, confidence, gradient, sample.left
 
 
 def sparse(inputs: Inputs) -> Inputs:
@@ -154,6 +171,12 @@ def enlarged(inputs: Inputs, factor: int) -> Inputs:
     return tile(disparity), tile(confidence), tile(gradient), tile(image)
 
 
+def center(inputs: Inputs, size: int) -> Inputs:
+    """So many pixels each way from the frame's middle."""
+    middle = tuple(slice(max(0, n // 2 - size), n // 2 + size) for n in inputs[0].shape)
+    return inputs[0][middle], inputs[1][middle], inputs[2][middle], inputs[3][middle]
+
+
 def measure_size(path: str) -> None:
     """Child process: one solve of the stored arrays; megapixels, seconds, memory in float32 images."""
     from refine import solve_mrf
@@ -178,9 +201,11 @@ def main() -> None:
     )
     parser.add_argument("--data", type=Path)
     parser.add_argument("--split", default="train")
+    parser.add_argument("--weights", type=Path, help="a run with regressor, ConfNet and GradNet")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--skip-direct", action="store_true", help="leave spsolve on the paper's form out")
+    parser.add_argument("--skip-sgbm", action="store_true", help="leave the harder cases out")
     parser.add_argument("--large", action="store_true", help="also 1920x1080 and 3840x2160")
     parser.add_argument("--child", help=argparse.SUPPRESS)
     parser.add_argument("--crop", type=int, default=0, help="only this many pixels from the centre each way")
@@ -189,17 +214,23 @@ def main() -> None:
     if options.child:
         measure_size(options.child)
         return
-    inputs = frame_inputs(options.data, options.split)
+    cases: dict[str, Inputs] = {}
+    if options.weights:
+        cases["networks"] = predicted_inputs(options.data, options.split, options.weights)
+    if not options.skip_sgbm:
+        cases["SGBM"] = frame_inputs(options.data, options.split)
+        cases["sparse"] = sparse(cases["SGBM"])
+    if not cases:
+        raise SystemExit("--skip-sgbm leaves nothing to solve without --weights")
     if options.crop:
-        middle = tuple(slice(max(0, n // 2 - options.crop), n // 2 + options.crop) for n in inputs[0].shape)
-        inputs = inputs[0][middle], inputs[1][middle], inputs[2][middle], inputs[3][middle]
-    known = inputs[1] > 0
-    print(f"confidence is 0 at {1 - known.mean():.0%} of the pixels; {options.threads} threads")
-    exact = [ours, pyamg_m_matrix, pyamg_cg]
-    compare("SGBM", inputs, "exact", exact, options.repeat)
-    compare("sparse", sparse(inputs), "exact", exact, options.repeat)
+        cases = {name: center(inputs, options.crop) for name, inputs in cases.items()}
+    for name, inputs in cases.items():
+        empty = 1 - (inputs[1] > MRFParameters().confidence_floor).mean()
+        print(f"{name}: confidence is at its floor at {empty:.0%} of the pixels; {options.threads} threads")
+        compare(name, inputs, "exact", [ours, pyamg_m_matrix, pyamg_cg], options.repeat)
+    first, inputs = next(iter(cases.items()))
     if not options.skip_direct:
-        compare("SGBM", inputs, "paper", [ours, spsolve], options.repeat)
+        compare(first, inputs, "paper", [ours, spsolve], options.repeat)
     print(
         "\n| size | seconds | microseconds a pixel | iterations | peak, float32 images |\n|---|---|---|---|---|"
     )

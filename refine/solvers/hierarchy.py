@@ -18,10 +18,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.solvers.stencils import Couplings, Singles
-from refine.weights import NEIGHBORS
-
-Indices = NDArray[np.int32]
+from refine.solvers.rows import Indices, Rows
+from refine.solvers.stencils import Singles
 
 STRENGTH = 0.5
 """A coupling is strong for i if it is at least this share of i's largest. At 0.25 the coarse levels hold
@@ -34,23 +32,13 @@ _MAX_LEVELS = 30
 _STALLED = 0.9
 """Coarsening ends where a level keeps more than this share of the one above."""
 _CHUNKS = 8
-"""Parts of a level that are relaxed independently; a constant, so that results do not depend on threads."""
+"""Parts of a level that are split and relaxed independently; a constant, so that results do not depend on threads."""
 _CHUNK_FROM = 4096
-_AROUND = np.array(NEIGHBORS)
-
-
-@dataclass(frozen=True)
-class Rows:
-    """A sparse matrix by rows."""
-
-    start: Indices
-    column: Indices
-    value: Singles
 
 
 @dataclass(frozen=True)
 class Level:
-    """One level below the image: its M-matrix, and how the next one is interpolated to it."""
+    """One level: its M-matrix, and how the next one is interpolated to it."""
 
     graph: Rows
     """Couplings, without the diagonal."""
@@ -61,11 +49,8 @@ class Level:
 
 @dataclass(frozen=True)
 class Hierarchy:
-    """Everything between the image and the coarsest level."""
+    """From the graph that was coarsened to the coarsest."""
 
-    prolong: Rows
-    """From the first level to the image."""
-    restrict: Rows
     levels: tuple[Level, ...]
     coarsest: Singles
     """Inverse of the coarsest matrix, dense; of its diagonal alone where coarsening ended early."""
@@ -90,45 +75,32 @@ class Hierarchy:
         return x
 
 
-def build_hierarchy(parts: Couplings, color_scale: float) -> Hierarchy:
-    """Coarsen the M-matrix with data and gradient terms as they are, and the graph Laplacian with couplings
-    color_scale (color_p w_pq + color_q w_qp) for the colour term."""
-    graph, excess = _image_graph(parts, color_scale)
-    image: tuple[Rows, Rows] | None = None
+def build_hierarchy(graph: Rows, excess: Singles) -> Hierarchy:
+    """Coarsen the M-matrix with these couplings (columns in order) and this excess."""
     levels: list[Level] = []
-    for _ in range(_MAX_LEVELS):
+    kept = 0.0
+    while excess.size > COARSEST and kept <= _STALLED and len(levels) < _MAX_LEVELS:
         diagonal = _diagonal(graph.start, graph.value, excess)
-        state = _split(*_of(graph), diagonal, STRENGTH, LOOSE)
+        state = _split(*_of(graph), diagonal, STRENGTH, LOOSE, _bounds(diagonal.size))
         prolong, coarse = _interpolation(graph, diagonal, state)
         restrict = _transposed(prolong, coarse)
-        next_graph, next_excess = _galerkin(graph, diagonal, excess, prolong, restrict)
-        if image is None:
-            image = prolong, restrict
-        else:
-            levels.append(Level(graph, _inverse(diagonal), prolong, restrict))
-        graph, excess = next_graph, next_excess
-        if coarse <= COARSEST or coarse > _STALLED * state.size:
-            break
-    assert image is not None
+        levels.append(Level(graph, _inverse(diagonal), prolong, restrict))
+        graph, excess = _galerkin(graph, diagonal, excess, prolong, restrict)
+        kept = coarse / state.size
     dense = excess.size <= 4 * COARSEST
     coarsest = (
         _dense_inverse(graph, excess) if dense else _inverse(_diagonal(graph.start, graph.value, excess))
     )
-    return Hierarchy(*image, tuple(levels), coarsest)
+    return Hierarchy(tuple(levels), coarsest)
 
 
 def _of(rows: Rows) -> tuple[Indices, Indices, Singles]:
     return rows.start, rows.column, rows.value
 
 
-def _image_graph(parts: Couplings, color_scale: float) -> tuple[Rows, Singles]:
-    height, width = parts.tau.shape[0] - 4, parts.tau.shape[1] - 4
-    start = np.zeros(height * width + 1, np.int32)
-    _count_image_edges(height, width, start)
-    np.cumsum(start, out=start)
-    column, value = np.empty(start[-1], np.int32), np.empty(start[-1], np.float32)
-    _fill_image_edges(parts.weights, parts.color, parts.axial, np.float32(color_scale), start, column, value)
-    return Rows(start, column, value), np.ascontiguousarray(parts.tau[2:-2, 2:-2]).ravel()
+def _bounds(size: int) -> NDArray[np.int64]:
+    """Where the chunks of a level begin and end."""
+    return np.linspace(0, size, (_CHUNKS if size >= _CHUNK_FROM else 1) + 1).astype(np.int64)
 
 
 def _interpolation(graph: Rows, diagonal: Singles, state: NDArray[np.int8]) -> tuple[Rows, int]:
@@ -154,9 +126,8 @@ def _galerkin(
 ) -> tuple[Rows, Singles]:
     """P' M P as couplings and excess."""
     coarse = restrict.start.size - 1
-    bounds = np.linspace(0, coarse, (_CHUNKS if coarse >= _CHUNK_FROM else 1) + 1).astype(np.int64)
     start = np.zeros(coarse + 1, np.int32)
-    pieces = _multiply_galerkin(*_of(graph), diagonal, *_of(prolong), *_of(restrict), bounds, start)
+    pieces = _multiply_galerkin(*_of(graph), diagonal, *_of(prolong), *_of(restrict), _bounds(coarse), start)
     np.cumsum(start, out=start)
     column = np.concatenate([piece[0] for piece in pieces])
     value = np.concatenate([piece[1] for piece in pieces])
@@ -180,38 +151,7 @@ def _dense_inverse(graph: Rows, excess: Singles) -> Singles:
     return np.linalg.pinv((matrix + matrix.T) / 2, hermitian=True).astype(np.float32)
 
 
-_UNDECIDED, _FINE, _COARSE, _TENTATIVE = 0, 1, 2, 3
-
-
-@njit(cache=True, parallel=True)
-def _count_image_edges(height, width, start):
-    for y in prange(height):
-        rows = 1 + (y > 0) + (y < height - 1)
-        for x in range(width):
-            start[y * width + x + 1] = rows * (1 + (x > 0) + (x < width - 1)) - 1
-
-
-@njit(cache=True, parallel=True)
-def _fill_image_edges(weights, color, axial, scale, start, column, value):
-    height, width = color.shape[0] - 4, color.shape[1] - 4
-    for row in prange(height):
-        y = np.int64(row)  # numba's parallel indices are unsigned
-        for x in range(width):
-            at = start[y * width + x]
-            for k in range(8):
-                v, u = y + _AROUND[k, 0], x + _AROUND[k, 1]
-                if 0 <= v < height and 0 <= u < width:
-                    # The neighbour sees p under the opposite number.
-                    tie = color[y + 2, x + 2] * weights[k, y + 2, x + 2]
-                    tie += color[v + 2, u + 2] * weights[7 - k, v + 2, u + 2]
-                    tie *= scale
-                    if v == y:
-                        tie += axial[0, y + 2, min(x, u) + 2]
-                    elif u == x:
-                        tie += axial[1, min(y, v) + 2, x + 2]
-                    column[at] = v * width + u
-                    value[at] = tie
-                    at += 1
+_UNDECIDED, _FINE, _COARSE = 0, 1, 2
 
 
 @njit(cache=True, parallel=True)
@@ -225,17 +165,20 @@ def _diagonal(start, value, excess):
     return diagonal
 
 
-@njit(cache=True)
-def _split(start, column, value, diagonal, strength, loose):
+@njit(cache=True, parallel=True)
+def _split(start, column, value, diagonal, strength, loose, bounds):
     """Coarse and fine unknowns, by both passes of Ruge and Stueben 1987.
 
     The second sees to it that two fine unknowns with a strong coupling share a coarse one; without it the
-    cycles converge several times slower.
+    cycles converge several times slower. Both run in each chunk by itself, as if nothing were coupled across
+    its bounds; then the second runs over what lies at the bounds.
     """
     size = diagonal.size
     threshold = np.empty(size, np.float32)
     state = np.zeros(size, np.int8)
-    for i in range(size):
+    priority, seen = np.zeros(size, np.int32), np.full(size, -1, np.int32)
+    after, before = np.full(size, -1, np.int32), np.full(size, -1, np.int32)
+    for i in prange(size):
         largest = total = np.float32(0)
         for e in range(start[i], start[i + 1]):
             largest = max(largest, value[e])
@@ -244,52 +187,68 @@ def _split(start, column, value, diagonal, strength, loose):
         if total <= loose * diagonal[i]:
             state[i] = _FINE
             threshold[i] = np.inf
-    _first_pass(start, column, value, threshold, state)
-    seen = np.full(size, -1, np.int32)
-    for i in range(size):
-        if state[i] != _FINE or threshold[i] == np.inf:
-            continue
-        for e in range(start[i], start[i + 1]):
-            if state[column[e]] == _COARSE and value[e] >= threshold[i]:
-                seen[column[e]] = i
-        tentative = -1
-        for e in range(start[i], start[i + 1]):
-            j = column[e]
-            if state[j] != _FINE or value[e] < threshold[i] or threshold[j] == np.inf:
-                continue
-            shared = False
-            for f in range(start[j], start[j + 1]):
-                if seen[column[f]] == i and value[f] >= threshold[j]:
-                    shared = True
-                    break
-            if not shared:
-                if tentative >= 0:
-                    tentative = i
-                    break
-                tentative = j
-                seen[j] = i
-        if tentative >= 0:
-            state[tentative] = _COARSE
+    for part in prange(bounds.size - 1):
+        first, last = bounds[part], bounds[part + 1]
+        _first_pass(start, column, value, threshold, state, priority, after, before, first, last)
+        for i in range(first, last):
+            _second_pass(start, column, value, threshold, state, seen, i, first, last)
+    for part in range(bounds.size - 1):
+        first, last = bounds[part], bounds[part + 1]
+        for i in range(first, last):
+            across = start[i] < start[i + 1] and (
+                column[start[i]] < first or column[start[i + 1] - 1] >= last
+            )
+            if across:
+                _second_pass(start, column, value, threshold, state, seen, i, 0, size)
     return state
 
 
 @njit(cache=True)
-def _first_pass(start, column, value, threshold, state):
-    """Ruge and Stueben's first pass: next comes whatever most unknowns would gladly interpolate from.
+def _second_pass(start, column, value, threshold, state, seen, i, first, last):
+    """One step of the second pass, for i, with the unknowns from first to last only."""
+    if state[i] != _FINE or threshold[i] == np.inf:
+        return
+    for e in range(start[i], start[i + 1]):
+        j = column[e]
+        if first <= j < last and state[j] == _COARSE and value[e] >= threshold[i]:
+            seen[j] = i
+    tentative = -1
+    for e in range(start[i], start[i + 1]):
+        j = column[e]
+        if not first <= j < last or state[j] != _FINE or value[e] < threshold[i] or threshold[j] == np.inf:
+            continue
+        shared = False
+        for f in range(start[j], start[j + 1]):
+            k = column[f]
+            if first <= k < last and seen[k] == i and value[f] >= threshold[j]:
+                shared = True
+                break
+        if not shared:
+            if tentative >= 0:
+                tentative = i
+                break
+            tentative = j
+            seen[j] = i
+    if tentative >= 0:
+        state[tentative] = _COARSE
+
+
+@njit(cache=True)
+def _first_pass(start, column, value, threshold, state, priority, after, before, first, last):
+    """Ruge and Stueben's first pass from first to last: next comes whatever most unknowns would gladly
+    interpolate from.
 
     Unknowns wait in doubly linked lists, one a priority: the number of undecided unknowns that depend on
     one strongly, plus two for each that is fine already.
     """
-    size = state.size
-    priority = np.zeros(size, np.int32)
     most = 0
-    for i in range(size):
+    for i in range(first, last):
         for e in range(start[i], start[i + 1]):
-            priority[i] += value[e] >= threshold[column[e]]
+            j = column[e]
+            priority[i] += first <= j < last and value[e] >= threshold[j]
         most = max(most, start[i + 1] - start[i])
     head = np.full(2 * most + 2, -1, np.int32)
-    after, before = np.full(size, -1, np.int32), np.full(size, -1, np.int32)
-    for i in range(size - 1, -1, -1):
+    for i in range(last - 1, first - 1, -1):
         if state[i] == _UNDECIDED:
             _insert(head, after, before, priority[i], i)
     top = head.size - 1
@@ -302,14 +261,14 @@ def _first_pass(start, column, value, threshold, state):
         state[i] = _COARSE
         for e in range(start[i], start[i + 1]):
             j = column[e]
-            if state[j] != _UNDECIDED:
+            if not first <= j < last or state[j] != _UNDECIDED:
                 continue
             if value[e] >= threshold[j]:
                 state[j] = _FINE
                 _remove(head, after, before, priority[j], j)
                 for f in range(start[j], start[j + 1]):
                     k = column[f]
-                    if state[k] == _UNDECIDED and value[f] >= threshold[j]:
+                    if first <= k < last and state[k] == _UNDECIDED and value[f] >= threshold[j]:
                         _remove(head, after, before, priority[k], k)
                         priority[k] += 1
                         _insert(head, after, before, priority[k], k)

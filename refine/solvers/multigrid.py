@@ -14,10 +14,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from refine.solvers.chessboard import Elimination, eliminate_black
 from refine.solvers.hierarchy import Hierarchy, build_hierarchy
 from refine.solvers.krylov import krylov
 from refine.solvers.linear import LinearSolution, Problem
-from refine.solvers.stencils import Singles, StencilOperator, couplings_of, operator_of, pad
+from refine.solvers.stencils import Couplings, Singles, StencilOperator, couplings_of, operator_of, pad
 
 MAX_ITERATIONS = 200
 COLOR_SCALE = 0.5
@@ -30,60 +31,42 @@ def solve_multigrid(problem: Problem, tolerance: float) -> LinearSolution:
     """Solve by CG (the exact form) or BiCGSTAB (the paper's), one V-cycle an application of the
     preconditioner."""
     parts = couplings_of(problem)
-    hierarchy = build_hierarchy(parts, COLOR_SCALE)
     operator = operator_of(parts, problem.form)
+    cycle = cycle_of(parts, operator)
     right_hand_side = parts.right_hand_side
     del parts  # the pixels' weights are in the operator now
-    cycle = Cycle(operator, hierarchy)
     start = pad(problem.start, np.float64)
     return krylov(operator, right_hand_side, start, tolerance, cycle, MAX_ITERATIONS)
+
+
+def cycle_of(parts: Couplings, operator: StencilOperator) -> Cycle:
+    """The preconditioner for one form's operator."""
+    elimination, graph, excess = eliminate_black(parts, COLOR_SCALE)
+    return Cycle(operator, elimination, build_hierarchy(graph, excess))
 
 
 class Cycle:
     """The preconditioner: Jacobi with A, coarse correction, Jacobi with A; symmetric where A is."""
 
-    def __init__(self, operator: StencilOperator, hierarchy: Hierarchy) -> None:
+    def __init__(self, operator: StencilOperator, elimination: Elimination, hierarchy: Hierarchy) -> None:
         self._operator = operator
+        self._elimination = elimination
         self._hierarchy = hierarchy
         self._step = DAMPING * operator.inverse_diagonal()
         self._x, self._product = np.zeros_like(operator.tau), np.zeros_like(operator.tau)
-        self._coarse = np.empty(hierarchy.restrict.start.size - 1, np.float32)
+        self._left = np.empty(elimination.number.max() + 1, np.float32)
 
     def __call__(self, residual: Singles) -> Singles:
         """An approximate solution of A x = residual, padded; overwritten by the next call."""
         x, product = self._x, self._product
         np.multiply(self._step, residual, out=x)
         self._operator.apply(x, product)
-        down, up = self._hierarchy.restrict, self._hierarchy.prolong
-        _restrict(down.start, down.column, down.value, residual, product, self._coarse)
-        _prolong(up.start, up.column, up.value, self._hierarchy.correct(self._coarse), x)
+        np.subtract(residual, product, out=product)
+        self._elimination.restrict(product, self._left)
+        self._elimination.prolong(self._hierarchy.correct(self._left), product, x)
         self._operator.apply(x, product)
         _smooth(self._step, residual, product, x)
         return x
-
-
-@njit(cache=True, parallel=True)
-def _restrict(start, column, value, residual, product, out):
-    """out = R (residual - product), the image padded."""
-    width = residual.shape[1] - 4
-    for i in prange(out.size):
-        total = np.float32(0)
-        for e in range(start[i], start[i + 1]):
-            y, x = column[e] // width + 2, column[e] % width + 2
-            total += value[e] * (residual[y, x] - product[y, x])
-        out[i] = total
-
-
-@njit(cache=True, parallel=True)
-def _prolong(start, column, value, coarse, x):
-    """x += P coarse, the image padded."""
-    height, width = x.shape[0] - 4, x.shape[1] - 4
-    for y in prange(height):
-        for j in range(width):
-            total = np.float32(0)
-            for e in range(start[y * width + j], start[y * width + j + 1]):
-                total += value[e] * coarse[column[e]]
-            x[y + 2, j + 2] += total
 
 
 @njit(cache=True, parallel=True)

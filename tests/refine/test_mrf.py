@@ -318,5 +318,54 @@ def test_couplings_next_to_nothing_do_not_stop_the_multigrid(step):
     np.testing.assert_allclose(solution.disparity, direct.disparity, rtol=0, atol=1e-3)
 
 
+@pytest.mark.parametrize(("height", "width"), [(1, 1), (1, 6), (7, 1), (6, 8), (7, 9), (8, 7)])
+def test_eliminating_black_pixels_is_the_schur_complement(height, width):
+    from refine.solvers.chessboard import eliminate_black
+    from refine.solvers.linear import Problem as Checked
+    from refine.solvers.stencils import couplings_of
+
+    problem = random_problem(height, width, seed=23)
+    checked = Checked(*problem.inputs, DEFAULTS, "exact", problem.disparity)
+    system = checked.system()
+    ties = np.diag(0.5 * system.color_weight) @ (np.eye(height * width) - system.laplacian.toarray())
+    dense = system.five_point.toarray() + np.diag((ties + ties.T).sum(axis=1)) - (ties + ties.T)
+    matrix = with_detours(dense, width)
+    black = np.indices((height, width)).sum(axis=0).ravel() % 2 == 1
+    coupled = (matrix[np.ix_(black, black)] < -1e-12).any(axis=1)
+    gone = np.flatnonzero(black)[~coupled]
+    left = np.setdiff1d(np.arange(height * width), gone)
+    across = matrix[np.ix_(left, gone)]
+    expected = matrix[np.ix_(left, left)] - across @ np.linalg.inv(matrix[np.ix_(gone, gone)]) @ across.T
+    _, graph, excess = eliminate_black(couplings_of(checked), 0.5)
+    found = np.zeros_like(expected)
+    found[np.repeat(np.arange(excess.size), np.diff(graph.start)), graph.column] = -graph.value
+    found += np.diag(excess - found.sum(axis=1))
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
+
+
+def with_detours(matrix, width):
+    """The M-matrix after two black pixels' couplings took the way over a pixel beside both that is three times
+    as strongly coupled to one of them; sums of rows as they were."""
+    ties, made = np.diag(np.diag(matrix)) - matrix, matrix.copy()
+    for corner in range(len(matrix) - width - 1):
+        y, x = divmod(corner, width)
+        if x == width - 1:
+            continue
+        square = np.array([[corner, corner + 1], [corner + width, corner + width + 1]])
+        one, other = square[1, 0], square[0, 1]
+        reds = (square[0, 0], square[1, 1])
+        if (y + x) % 2 == 1:
+            (one, other), reds = reds, (one, other)
+        # A red pixel as good as one black pixel is coupled to the other in its stead.
+        strength, red, partner = max((ties[b, r], r, one + other - b) for b in (one, other) for r in reds)
+        if strength < 3 * ties[one, other]:
+            continue
+        for sign, p, q in ((1, one, other), (-1, red, partner)):
+            weight = sign * ties[one, other]
+            made[[p, q], [q, p]] += weight
+            made[[p, q], [p, q]] -= weight
+    return made
+
+
 def test_neighbours_are_the_eight_around():
     assert set(NEIGHBORS) == {(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)} - {(0, 0)}
