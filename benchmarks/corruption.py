@@ -6,11 +6,14 @@ import hashlib
 import json
 import tarfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+import cv2
 import numpy as np
 import trimesh
 
+from datagen.assets import prepare_environment, prepare_mesh, prepare_texture
 from datagen.dataset import read_scene
 from datagen.formats import (
     read_camera_data,
@@ -44,14 +47,15 @@ def read_shard(path: Path) -> None:
     shard_index.__wrapped__(path)  # not the answer remembered from the time before
 
 
-def read_mesh(path: Path) -> None:
-    """A mesh as a user's own assets would be read; trimesh's many errors all refuse the file."""
+def read_asset(prepare: Callable[[Path], object], path: Path) -> None:
+    """A user's own file, read as `datagen.assets` does: whatever its parser raises refuses it."""
     try:
-        trimesh.load(path, process=False)
+        prepare(path)
     except Exception as error:
         raise ValueError(" ".join(str(error).split())) from error
 
 
+read_mesh = partial(read_asset, prepare_mesh)
 READERS: dict[str, Callable[[Path], object]] = {
     "pfm": read_pfm,
     "png": read_png,
@@ -64,7 +68,10 @@ READERS: dict[str, Callable[[Path], object]] = {
     "tar": read_shard,
     "obj": read_mesh,
     "stl": read_mesh,
+    "ply": read_mesh,
     "glb": read_mesh,
+    "jpg": partial(read_asset, prepare_texture),
+    "hdr": partial(read_asset, prepare_environment),
 }
 
 
@@ -83,7 +90,10 @@ def make_examples(folder: Path) -> dict[str, Path]:
         "tar": folder / "train-000000.tar",
         "obj": folder / "a.obj",
         "stl": folder / "a.stl",
+        "ply": folder / "a.ply",
         "glb": folder / "a.glb",
+        "jpg": folder / "a.jpg",
+        "hdr": folder / "a.hdr",
     }
     write_pfm(paths["pfm"], rng.normal(size=(20, 30)))
     write_png(paths["png"], rng.integers(0, 255, (20, 30, 3), dtype=np.uint8))
@@ -98,8 +108,10 @@ def make_examples(folder: Path) -> dict[str, Path]:
     _write_weights(paths["weights"])
     _write_shard(paths["tar"], paths["png"])
     box = trimesh.creation.icosphere(subdivisions=2)
-    for kind in ("obj", "stl", "glb"):
+    for kind in ("obj", "stl", "ply", "glb"):
         box.export(paths[kind])
+    cv2.imwrite(str(paths["jpg"]), rng.integers(0, 255, (20, 30, 3), dtype=np.uint8))
+    cv2.imwrite(str(paths["hdr"]), rng.uniform(0.1, 2.0, (16, 32, 3)).astype(np.float32))
     return paths
 
 

@@ -8,25 +8,24 @@ original's SHA-256 (`scenes.assets`).
 from __future__ import annotations
 
 import hashlib
-import multiprocessing
 import os
-import resource
 from collections.abc import Callable
-from concurrent.futures import TimeoutError as FutureTimeoutError
+from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
-from pebble import ProcessExpired, ProcessPool
 
 from datagen.errors import DatasetError
+from datagen.executors import LocalExecutor, WorkerPolicy
 from datagen.formats.limits import check_image_size
 from scenes.assets import Asset, AssetPool
 from scenes.geometry import solid
+from workers import Limits
 
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
 TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
@@ -36,8 +35,9 @@ MAX_TRIANGLES = 300_000
 MAX_SIDE_PX = 4096
 MEAN_LUMINANCE = 0.5
 """What environments are scaled to, so that they light a scene as the generator's own skies do."""
-MEMORY_BYTES = 4 << 30
-TIMEOUT_S = 60.0
+MESH_LIMITS = Limits(timeout_s=60.0, memory_bytes=1 << 30)
+PICTURE_LIMITS = Limits(timeout_s=60.0, memory_bytes=4 << 30)
+"""An environment of 16384 x 8192 pixels is 1.6 GB before it is made smaller."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,14 @@ def import_assets(
     store.mkdir(parents=True, exist_ok=True)
     skipped: list[str] = []
     kinds: list[tuple[Asset, ...]] = []
-    for folder, suffixes, prepare in (
-        (meshes, MESH_SUFFIXES, _prepare_mesh),
-        (textures, TEXTURE_SUFFIXES, _prepare_texture),
-        (environments, ENVIRONMENT_SUFFIXES, _prepare_environment),
+    for folder, suffixes, prepare, limits in (
+        (meshes, MESH_SUFFIXES, prepare_mesh, MESH_LIMITS),
+        (textures, TEXTURE_SUFFIXES, prepare_texture, PICTURE_LIMITS),
+        (environments, ENVIRONMENT_SUFFIXES, prepare_environment, PICTURE_LIMITS),
     ):
-        kinds.append(() if folder is None else _import_folder(folder, suffixes, prepare, store, skipped))
+        kinds.append(
+            () if folder is None else _import_folder(folder, suffixes, prepare, limits, store, skipped)
+        )
     return ImportedAssets(AssetPool(*kinds), tuple(skipped))
 
 
@@ -72,54 +74,45 @@ Preparer = Callable[[Path], dict[str, NDArray[np.generic]]]
 
 
 def _import_folder(
-    folder: Path, suffixes: tuple[str, ...], prepare: Preparer, store: Path, skipped: list[str]
+    folder: Path,
+    suffixes: tuple[str, ...],
+    prepare: Preparer,
+    limits: Limits,
+    store: Path,
+    skipped: list[str],
 ) -> tuple[Asset, ...]:
     if not folder.is_dir():
         raise DatasetError(f"{folder}: there is no such folder")
     paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in suffixes and path.is_file())
-    found: dict[str, Asset] = {}
-    context = multiprocessing.get_context("spawn")
-    with ProcessPool(max_workers=1, context=context, initializer=_limit_memory) as pool:
-        for path in paths:
-            if path.stat().st_size > MAX_FILE_BYTES:
-                skipped.append(f"{path}: is larger than {MAX_FILE_BYTES >> 20} MB")
-                continue
-            with path.open("rb") as file:
-                sha256 = hashlib.file_digest(file, "sha256").hexdigest()
-            if sha256 in found:
-                continue
-            future = pool.schedule(
-                _prepare_file, args=(prepare, path, store / f"{sha256}.npz"), timeout=TIMEOUT_S
-            )
-            problem = _problem_of(future)
+    originals: dict[str, Path] = {}
+    for path in paths:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            skipped.append(f"{path}: is larger than {MAX_FILE_BYTES >> 20} MB")
+            continue
+        with path.open("rb") as file:
+            originals.setdefault(hashlib.file_digest(file, "sha256").hexdigest(), path)
+    found: list[Asset] = []
+    one_worker = LocalExecutor(({},), WorkerPolicy(limits, attempts=1))
+    jobs = [(path, store / f"{sha256}.npz") for sha256, path in originals.items()]
+    with closing(one_worker.run(partial(_prepare_file, prepare), jobs)) as outcomes:
+        for outcome in outcomes:
+            path, prepared = outcome.job
+            problem = outcome.result
+            if outcome.failure is not None:
+                problem = f"cannot be read, {outcome.failure.sentence}"
             if problem is None:
-                found[sha256] = Asset(path.relative_to(folder).as_posix(), sha256)
+                found.append(Asset(path.relative_to(folder).as_posix(), prepared.stem))
             else:
                 skipped.append(f"{path}: {problem}")
     if not found:
         reason = f": {skipped[-1]}" if skipped else ""
         raise DatasetError(f"{folder}: has no usable file among {', '.join(suffixes)}{reason}")
-    return tuple(sorted(found.values(), key=lambda asset: asset.sha256))
+    return tuple(sorted(found, key=lambda asset: asset.sha256))
 
 
-def _problem_of(future: Any) -> str | None:
-    """One sentence if the worker failed, in whatever way."""
-    try:
-        problem: str | None = future.result()
-    except FutureTimeoutError:
-        return f"took more than {TIMEOUT_S:.0f} s to read"
-    except ProcessExpired:
-        return "crashed its reader"
-    return problem
-
-
-def _limit_memory() -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def _prepare_file(prepare: Preparer, path: Path, target: Path) -> str | None:
-    """In the worker: prepare one file, or say why not. Whatever a parser raises is the file's fault."""
+def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> str | None:
+    """In the worker: prepare one file for the store, or say why not. Whatever a parser raises is its fault."""
+    path, target = job
     try:
         arrays = prepare(path)
     except MemoryError:
@@ -133,7 +126,8 @@ def _prepare_file(prepare: Preparer, path: Path, target: Path) -> str | None:
     return None
 
 
-def _prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
+def prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
+    """A mesh's `vertices`, `triangles` and `corner_uv`. Raises whatever the parser does."""
     options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     with path.open("rb") as file:  # From an open file no parser looks for others beside it.
         loaded = trimesh.load(file, file_type=path.suffix[1:].lower(), force="mesh", process=False, **options)
@@ -155,14 +149,16 @@ def _prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
     return {"vertices": mesh.vertices, "triangles": mesh.triangles, "corner_uv": mesh.corner_uv}
 
 
-def _prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
+def prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
+    """A picture's `image`, uint8 RGB. Raises whatever the parser does."""
     image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR)
     if image is None:
         raise ValueError("its pixels do not decode")
     return {"image": cv2.cvtColor(_bounded(image), cv2.COLOR_BGR2RGB)}
 
 
-def _prepare_environment(path: Path) -> dict[str, NDArray[np.generic]]:
+def prepare_environment(path: Path) -> dict[str, NDArray[np.generic]]:
+    """An environment's `radiance`, float32 RGB. Raises whatever the parser does."""
     radiance = _read_exr(path) if path.suffix.lower() == ".exr" else _read_hdr(path)
     radiance = np.nan_to_num(np.maximum(_bounded(radiance), 0), posinf=0.0)
     luminance = float(radiance.mean())

@@ -16,7 +16,7 @@ from storage import write_text
 T = TypeVar("T")
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
-_OWN_DIGEST = "manifest_sha256"
+OWN_DIGEST = "manifest_sha256"
 _NO_DIGEST = "0" * 64
 _NO_DIGEST_AT_END = re.compile(rf'"{_NO_DIGEST}"\n\}}\n\Z')
 
@@ -77,7 +77,7 @@ def write_manifest(path: Path, manifest: SceneManifest) -> None:
 
 def seal(record: dict[str, Any]) -> str:
     """A record as JSON with the text's own SHA-256 at its end, taken with zeros in that place."""
-    text = json.dumps(record | {_OWN_DIGEST: _NO_DIGEST}, indent=1) + "\n"
+    text = json.dumps(record | {OWN_DIGEST: _NO_DIGEST}, indent=1) + "\n"
     digest = hashlib.sha256(text.encode()).hexdigest()
     return _NO_DIGEST_AT_END.sub(f'"{digest}"\n}}\n', text)
 
@@ -87,10 +87,10 @@ def read_manifest(path: Path) -> SceneManifest:
     try:
         content = read_bounded(path, MAX_JSON_BYTES)
         data = json.loads(content)
-        digest = data.pop(_OWN_DIGEST, None)
-        files = tuple(_typed(FileEntry, _FILE_TYPES, entry) for entry in _as_list(data.pop("files")))
+        digest = data.pop(OWN_DIGEST, None)
+        files = file_entries(data.pop("files"))
         manifest = _typed(SceneManifest, _MANIFEST_TYPES, data | {"files": files})
-        _check_seal(content, digest)
+        check_seal(content, digest)
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}" if str(path) not in str(error) else str(error)) from error
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
@@ -98,12 +98,20 @@ def read_manifest(path: Path) -> SceneManifest:
     return manifest
 
 
-def _check_seal(content: bytes, digest: Any) -> None:
+def check_seal(content: bytes, digest: Any) -> None:
+    """Raise DatasetError, without the file's name, unless content sealed by `seal` is what it was."""
     if not isinstance(digest, str) or not _SHA256.fullmatch(digest):
         raise DatasetError(f"does not carry its own SHA-256 but {str(digest)[:80]!r}")
     plain = content.replace(digest.encode(), _NO_DIGEST.encode())
     if hashlib.sha256(plain).hexdigest() != digest:
         raise DatasetError("is damaged, its SHA-256 is not the one it carries")
+
+
+def file_entries(value: Any) -> tuple[FileEntry, ...]:
+    """Entries from JSON. Raises TypeError, ValueError or DatasetError for anything else."""
+    if not isinstance(value, list):
+        raise TypeError("its files are not a list")
+    return tuple(_typed(FileEntry, _FILE_TYPES, entry) for entry in value)
 
 
 _FILE_TYPES: dict[str, type] = {"path": str, "size": int, "sha256": str}
@@ -117,12 +125,6 @@ _MANIFEST_TYPES: dict[str, type] = {
     "statistics": dict,
     "versions": dict,
 }
-
-
-def _as_list(value: Any) -> list[Any]:
-    if not isinstance(value, list):
-        raise TypeError("its files are not a list")
-    return value
 
 
 def _typed(record: type[T], types: dict[str, type], data: dict[str, Any]) -> T:

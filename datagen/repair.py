@@ -12,8 +12,8 @@ from datagen.layout import SPLITS, Layout
 from datagen.manifest import SceneManifest
 from datagen.recipe import read_recipe
 from datagen.render import RenderSummary, render_dataset
-from datagen.scene_check import Problem
 from datagen.staging import discard_uncommitted
+from datagen.verify_report import Problem
 
 
 def broken_scenes(problems: Iterable[Problem]) -> list[tuple[str, int]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,32 +11,18 @@ from datagen.dataset import StereoSample, read_scene
 from datagen.errors import DatasetError
 from datagen.formats import read_camera_data
 from datagen.frame_check import FrameCheck
+from datagen.integrity import compare
 from datagen.layout import EYES, FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, Layout
 from datagen.manifest import FileEntry, SceneManifest, read_manifest
 from datagen.raycast import SceneRayCaster
 from datagen.recipe import Recipe
 from datagen.scene_geometry import SceneGeometry
+from datagen.verify_report import Problem
 from scenes import Scene
 
 SAMPLED_PIXELS = 500
 """How many random pixels of each view are compared with the scene's geometry by default."""
 POSE_TOLERANCE = 1e-9
-
-
-@dataclass(frozen=True)
-class Problem:
-    """One thing that is wrong."""
-
-    place: str
-    """The file, scene or folder, relative to the data set's root."""
-    message: str
-    split: str | None = None
-    scene: int | None = None
-    """The scene to render again; None where no scene is to blame."""
-
-    def __str__(self) -> str:
-        place = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in self.place)
-        return f"{place}: {self.message}"
 
 
 @dataclass
@@ -101,23 +85,12 @@ class SceneCheck:
 
     def _is_whole(self, entry: FileEntry) -> bool:
         """Compare one file with its manifest entry."""
-        path = self.layout.root / entry.path
+        size, problem = compare(self.layout, entry)
         self.files += 1
-        try:
-            if path.exists() and not path.is_file():  # A pipe or a device would be read without end.
-                raise OSError(errno.EINVAL, "it is no regular file")
-            with self.layout.local(path).open("rb") as file:
-                digest = hashlib.file_digest(file, "sha256").hexdigest()
-                size = file.tell()
-        except OSError as error:
-            self._found(path, f"cannot be read: {error.strerror}")
-            return False
         self.bytes_read += size
-        if size != entry.size:
-            self._found(path, f"has {size} bytes where the manifest has {entry.size}")
-        elif digest != entry.sha256:
-            self._found(path, "is damaged, its SHA-256 is not the manifest's")
-        return (size, digest) == (entry.size, entry.sha256)
+        if problem:
+            self._found(self.layout.root / entry.path, problem)
+        return problem is None
 
     def _are_readable(self, paths: list[Path]) -> bool:
         """Whether files that the scene must have are whole; one the manifest does not list is a problem."""

@@ -6,7 +6,6 @@ import tempfile
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
@@ -16,43 +15,15 @@ from datagen.mirror import MirroredLayout, open_mirror
 from datagen.quarantine import quarantined_scenes
 from datagen.recipe import Recipe, read_recipe, recipe_to_text
 from datagen.render import local_executor
-from datagen.scene_check import SAMPLED_PIXELS, Problem, SceneCheck
+from datagen.scene_check import SAMPLED_PIXELS, SceneCheck
+from datagen.shard_check import has_shards, verify_shards
+from datagen.verify_report import Problem, VerifyReport
 from storage import LocalTree, open_tree
 
 FEW_SCENES = 8
 """Fewer scenes than this are checked before other processes would have started."""
 CHECK_TIMEOUT_S = 600.0
 """Of one scene."""
-
-
-@dataclass(frozen=True)
-class VerifyReport:
-    """What was looked at and what was found."""
-
-    root: str
-    """Folder or URL."""
-    scenes: int
-    frames: int
-    files: int
-    bytes_read: int
-    seconds: float
-    problems: tuple[Problem, ...]
-
-    @property
-    def ok(self) -> bool:
-        return not self.problems
-
-    @property
-    def megabytes_per_second(self) -> float:
-        return self.bytes_read / 1e6 / self.seconds if self.seconds else 0.0
-
-    def __str__(self) -> str:
-        found = f"{len(self.problems)} problems" if self.problems else "no problem"
-        return (
-            f"{self.root}: {found} in {self.scenes} scenes, {self.frames} frames, {self.files} files, "
-            f"{self.bytes_read / 1e6:.1f} MB read in {self.seconds:.1f} s "
-            f"({self.megabytes_per_second:.0f} MB/s)"
-        )
 
 
 def verify_dataset(
@@ -63,7 +34,7 @@ def verify_dataset(
     sampled_pixels: int = SAMPLED_PIXELS,
     only: Collection[tuple[str, int]] | None = None,
 ) -> VerifyReport:
-    """Check every file and every frame of a data set.
+    """Check every file and every frame of a data set, or every file of shards exported from one.
 
     Files: size and SHA-256 as in the manifest, none missing, none that belongs to nothing. Arrays: they
     decode, have the camera's size and are finite; gradients, occlusion, object index and the two views'
@@ -79,9 +50,11 @@ def verify_dataset(
         only: Check these (split, scene) and nothing else.
 
     Raises:
-        DatasetError: For a folder that is missing or no data set at all, or a recipe that cannot be read.
+        DatasetError: For a folder that is missing or no data set at all, or a recipe or index that cannot be read.
     """
     start = time.perf_counter()
+    if has_shards(open_tree(root)):
+        return verify_shards(open_tree(root), progress, workers=workers)
     with _opened(root) as layout:
         recipe = read_recipe(layout.recipe)
         checks = [

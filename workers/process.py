@@ -96,7 +96,13 @@ class WorkerProcess:
             self.stop
         )  # At exit multiprocessing waits for its children, and ours waits for calls.
         self._deadline = 0.0
+        self._begun = False
         self._end: _Returned | _Raised | None = None
+
+    @property
+    def begun(self) -> bool:
+        """Whether the process has come up, imported what the last call needs and begun it."""
+        return self._begun
 
     @property
     def alive(self) -> bool:
@@ -114,7 +120,7 @@ class WorkerProcess:
 
     def start(self, function: Callable[..., Any], *args: Any) -> None:
         """Begin a call. Raises what pickling the function or its arguments raises."""
-        self._end = None
+        self._end, self._begun = None, False
         self._output.truncate(0)
         self._deadline = time.monotonic() + START_TIMEOUT_S + self.limits.timeout_s
         try:
@@ -171,6 +177,7 @@ class WorkerProcess:
             self._end = self._death()
             return
         if message == _BEGUN:
+            self._begun = True
             self._deadline = time.monotonic() + self.limits.timeout_s
         else:
             self._end = message

@@ -12,10 +12,12 @@ from datagen.executors.base import Failure, Outcome
 from workers import Limits, WorkerError, WorkerProcess
 
 MAX_KILLS = 30
-"""Being killed from outside is not the job's fault, but a machine without memory does that too.
+"""How often a job may be killed from outside. It is not the job's fault, but a machine without memory does that too."""
+MAX_STARTS_KILLED = 100
+"""How often in a row processes may be killed before they have begun the job, which the job has no part in.
 
-With a worker killed every four seconds on a busy machine, where new ones are slow to come up, 18 of 300 jobs were
-killed ten times in a row.
+Counted apart, since coming up takes longer than a small job: where workers were killed every four seconds on a busy
+machine, 18 of 300 jobs were given up before any process had come to them.
 """
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
@@ -45,7 +47,7 @@ class Supervisor:
         self._worker: WorkerProcess | None = None
         self._jobs_done = 0
         self._call: tuple[Callable[[Any], Any], Any] | None = None
-        self._tries = self._faults = self._kills = 0
+        self._tries = self._faults = self._kills = self._starts_killed = 0
 
     @property
     def busy(self) -> bool:
@@ -57,7 +59,7 @@ class Supervisor:
 
     def start(self, function: Callable[[Any], Any], job: Any) -> None:
         self._call = (function, job)
-        self._tries = self._faults = self._kills = 0
+        self._tries = self._faults = self._kills = self._starts_killed = 0
         self._try()
 
     def poll(self) -> Outcome[Any, Any] | None:
@@ -98,6 +100,11 @@ class Supervisor:
         self._worker.start(*self._call)
 
     def _deserves_another_try(self, failure: Failure) -> bool:
+        assert self._worker is not None
+        if failure.kind == "killed" and not self._worker.begun:
+            self._starts_killed += 1
+            return self._starts_killed < MAX_STARTS_KILLED
+        self._starts_killed = 0
         if failure.kind == "killed":
             self._kills += 1
             return self._kills < MAX_KILLS

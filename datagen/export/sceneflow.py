@@ -10,6 +10,7 @@ from itertools import groupby
 from pathlib import Path
 
 from datagen.dataset import StereoDataset
+from datagen.integrity import intact
 from datagen.layout import RENDER_PASSES
 from datagen.manifest import read_manifest
 from storage import Tree
@@ -22,7 +23,7 @@ def export_sceneflow(sets: Sequence[StereoDataset], out: Tree, progress: Callabl
     total, done = sum(map(len, sets)), 0
     for frames in sets:
         layout = frames.layout
-        for scene, samples in groupby(frames, lambda sample: sample.scene):
+        for scene, samples in groupby(intact(frames), lambda sample: sample.scene):
             manifest = read_manifest(layout.local(layout.manifest(frames.split, scene)))
             for entry in manifest.files:
                 if Path(entry.path).parts[0] in KINDS:

@@ -9,9 +9,12 @@ import io
 import json
 import tarfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, replace
 
 from datagen.dataset import StereoDataset, StereoSample
+from datagen.integrity import intact
 from datagen.layout import EYES, KINDS, RENDER_PASSES, TARGETS
+from datagen.manifest import FileEntry, file_entry, seal
 from datagen.sources.webdataset import INDEX_NAME
 from storage import Tree
 
@@ -27,21 +30,21 @@ def export_webdataset(
         raise ValueError(f"a shard holds at least one frame, got {frames_per_shard}")
     total, done = sum(map(len, sets)), 0
     index: dict[str, list[str]] = {}
+    files: list[FileEntry] = []
     for frames in sets:
         for shard, first in enumerate(range(0, len(frames), frames_per_shard)):
             name = f"{frames.split}-{shard:06d}.tar"
             index[name] = []
-            with (
-                out.writing(name) as path,
-                tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as tar,
-            ):
-                for sample in frames[first : first + frames_per_shard]:
-                    index[name].append(_add(tar, sample))
-                    done += 1
-                    progress(done, total)
+            with out.writing(name) as path:
+                with tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as tar:
+                    for sample in intact(frames[first : first + frames_per_shard]):
+                        index[name].append(_add(tar, sample))
+                        done += 1
+                        progress(done, total)
+                files.append(replace(file_entry(path.parent, path), path=name))
     recipe = sets[0].layout.recipe
     out.write(recipe.name, recipe.read_bytes())
-    out.write(INDEX_NAME, json.dumps({"shards": index}).encode())
+    out.write(INDEX_NAME, seal({"shards": index, "files": [asdict(entry) for entry in files]}).encode())
 
 
 def _add(tar: tarfile.TarFile, sample: StereoSample) -> str:

@@ -26,6 +26,7 @@ from datagen.formats.pfm import decode_pfm
 from datagen.formats.png import decode_png
 from datagen.frame import FileFrame, StereoFrame
 from datagen.layout import SPLITS
+from datagen.manifest import OWN_DIGEST, FileEntry, check_seal, file_entries
 from datagen.shards import list_shards, local_copy, read_sample_member, shard_index
 from datagen.source import SourceFormat
 
@@ -68,19 +69,30 @@ def _recognises(root: Path) -> bool:
 
 
 def _find(location: str, split: str) -> Sequence[StereoFrame]:
-    index = _read_index(location)
-    shards = list_shards(location) if index is None else [f"{location.rstrip('/')}/{name}" for name in index]
+    index = read_index(location)
+    names = None if index is None else index.shards
+    shards = list_shards(location) if names is None else [f"{location.rstrip('/')}/{name}" for name in names]
     samples: list[tuple[str, str]] = []
     for shard in sorted(shards):
         name = _SHARD_NAME.fullmatch(shard.rpartition("/")[2])
         if name and name[1] == split:
-            keys = shard_index(local_copy(shard)) if index is None else index[name[0]]
+            keys = shard_index(local_copy(shard)) if names is None else names[name[0]]
             samples += ((shard, key) for key in keys)
     return ShardFrames(tuple(samples))
 
 
-def _read_index(location: str) -> dict[str, list[str]] | None:
-    """Shard names to their samples' keys, None without an index file. Raises FormatError for a damaged one."""
+@dataclass(frozen=True)
+class ShardSetIndex:
+    """What `index.json` says of the shards beside it."""
+
+    shards: dict[str, list[str]]
+    """Names to the keys of their samples."""
+    files: tuple[FileEntry, ...]
+    """Sizes and SHA-256; none where the index is not of our own making."""
+
+
+def read_index(location: str) -> ShardSetIndex | None:
+    """The index of a folder of shards, None if it has none. Raises DatasetError for a damaged one."""
     if location.endswith(".tar"):
         return None
     url = f"{location.rstrip('/')}/{INDEX_NAME}"
@@ -92,17 +104,20 @@ def _read_index(location: str) -> dict[str, list[str]] | None:
     except (OSError, ValueError, ImportError) as error:
         raise DatasetError(f"{url}: cannot be read ({error})") from error
     try:
-        shards = json.loads(content)["shards"]
+        data = json.loads(content)
+        if OWN_DIGEST in data:
+            check_seal(content, data[OWN_DIGEST])
+        index = ShardSetIndex(data["shards"], file_entries(data.get("files", [])))
         if not all(
             _SHARD_NAME.fullmatch(name)
             and isinstance(keys, list)
             and all(isinstance(key, str) for key in keys)
-            for name, keys in shards.items()
+            for name, keys in index.shards.items()
         ):
             raise ValueError("a shard's name or its list of samples is not as it should be")
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FormatError(f"{url}: is not an index of shards ({error})") from error
-    return dict(shards)
+    return index
 
 
 def _frame(shard: str, key: str) -> FileFrame:

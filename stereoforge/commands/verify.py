@@ -12,7 +12,8 @@ import tyro
 
 from datagen.manifest import SceneManifest
 from datagen.repair import broken_scenes, repair_dataset
-from datagen.verify import VerifyReport, verify_dataset
+from datagen.verify import verify_dataset
+from datagen.verify_report import VerifyReport
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console, progress_bar
 from stereoforge.values import shown

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
+import time
 from pathlib import Path
 
 import cv2
@@ -12,13 +14,14 @@ import pytest
 import trimesh
 
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe
-from datagen.assets import ImportedAssets, import_assets
+from datagen.assets import ImportedAssets, _import_folder, import_assets
 from datagen.layout import Layout
 from datagen.manifest import read_manifest
 from datagen.verify import verify_dataset
 from scenes import FAMILIES, scene_from_json, scene_to_json
 from scenes.assets import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture, use_store
 from stereoforge.commands.render import Render
+from workers import Limits
 
 RNG = np.random.default_rng(0)
 
@@ -135,6 +138,31 @@ def test_every_family_takes_the_user_s_files_in_the_place_of_its_own(
     assert meshes <= {asset.sha256 for asset in imported.pool.of_split("train").meshes}
     assert pictures
     assert pictures <= {asset.sha256 for asset in imported.pool.of_split("train").textures}
+
+
+def crash_or_grow(path: Path) -> dict[str, np.ndarray]:
+    if path.stem == "crash":
+        ctypes.string_at(0)
+    if path.stem == "greedy":
+        return {"held": np.ones(1 << 28)}
+    if path.stem == "slow":
+        time.sleep(600)
+    return {"fine": np.zeros(1)}
+
+
+@pytest.mark.slow
+def test_a_file_that_brings_its_reader_down_is_skipped(tmp_path: Path) -> None:
+    for number, name in enumerate(("crash", "fine", "greedy", "slow")):
+        (tmp_path / f"{name}.stl").write_bytes(bytes([number]))
+    skipped: list[str] = []
+    limits = Limits(timeout_s=2.0, memory_bytes=900 << 20)
+    (asset,) = _import_folder(tmp_path, (".stl",), crash_or_grow, limits, tmp_path, skipped)
+    assert asset.name == "fine.stl"
+    crash, greedy, slow = (sentence.removeprefix(f"{tmp_path}/") for sentence in skipped)
+    assert crash == "crash.stl: cannot be read, its process crashed (SIGSEGV)"
+    assert greedy.startswith("greedy.stl: ")
+    assert "memory" in greedy or "used" in greedy
+    assert slow == "slow.stl: cannot be read, ran longer than its limit of 2 s"
 
 
 def test_unknown_folders_and_files_are_refused(user: Path, tmp_path: Path) -> None:

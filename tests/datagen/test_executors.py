@@ -6,11 +6,13 @@ import ctypes
 import os
 import signal
 import time
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from datagen.executors import LocalExecutor, WorkerPolicy
+from datagen.executors import LocalExecutor, WorkerPolicy, supervisor
 from datagen.executors.devices import assign_devices, find_gpus
 from workers import Limits
 
@@ -60,6 +62,39 @@ def test_every_kind_of_end_is_an_outcome(tmp_path: Path) -> None:
     }
     assert [outcomes[kind].attempts for kind in described] == [1, 1, 2, 2]
     assert all(end is not None and f"this is {kind}" in end.output for kind, end in ends.items())
+
+
+@dataclass(frozen=True)
+class KillsOnArrival:
+    """A job whose first few processes are killed while they unpickle it, before they begin."""
+
+    folder: Path
+    times: int
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        with (self.folder / "starts").open("a") as starts:
+            starts.write("x")
+        if len((self.folder / "starts").read_text()) <= self.times:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+def succeed(job: object) -> bool:
+    return job is not None
+
+
+@pytest.mark.slow
+def test_a_process_killed_before_it_begins_does_not_count_against_the_job(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "MAX_KILLS", 2)
+    (outcome,) = LocalExecutor(({},)).run(succeed, [KillsOnArrival(tmp_path, 3)])
+    assert (outcome.result, outcome.attempts) == (True, 4)
+    # But no process that ever comes up is a fault of the machine that somebody has to be told of.
+    monkeypatch.setattr(supervisor, "MAX_STARTS_KILLED", 2)
+    (outcome,) = LocalExecutor(({},)).run(succeed, [KillsOnArrival(tmp_path, 100)])
+    assert outcome.failure is not None
+    assert (outcome.failure.kind, outcome.attempts) == ("killed", 2)
 
 
 def report_pid(seconds: int) -> int:

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 import webdataset
 
-from datagen import StereoDataset
+from datagen import DatasetError, StereoDataset
+from datagen.export import EXPORTERS, ExportOptions
 from datagen.export.kitti import encode_disparity
 from datagen.export.lidar import lidar_mask
 from datagen.layout import Layout
 from datagen.source import open_source
+from datagen.verify import verify_dataset
 from stereoforge.cli import main
+from storage import open_tree
 
 
 def export(data: Path, kind: str, out: Path, *flags: str) -> None:
@@ -124,6 +127,50 @@ def test_webdataset_shards_stream_the_same_bytes(analytic_dataset: Path, tmp_pat
         meta = json.loads(sample["meta.json"])
         assert (meta["scene"], meta["frame"], meta["render_pass"]) == (frame.scene, frame.frame, "clean")
         assert meta["baseline_m"] == frame.scene_record.camera.baseline_m
+
+
+@pytest.mark.parametrize("kind", EXPORTERS)
+def test_a_damaged_data_set_is_not_exported(kind: str, own_dataset: Path, tmp_path: Path) -> None:
+    damaged = Layout(own_dataset).file("occlusion", "train", 0, "right", 6)
+    content = bytearray(damaged.read_bytes())
+    content[len(content) // 2] ^= 1
+    damaged.write_bytes(content)
+    sets = [StereoDataset(own_dataset, "train")]
+    with pytest.raises(DatasetError, match=f"{damaged}: is damaged, its SHA-256 is not the manifest's"):
+        EXPORTERS[kind](sets, open_tree(tmp_path / "out"), ExportOptions(), lambda *_: None)
+
+
+def test_damage_to_shards_is_found(analytic_dataset: Path, tmp_path: Path) -> None:
+    export(analytic_dataset, "webdataset", tmp_path, "--frames-per-shard", "3")
+    report = verify_dataset(tmp_path)
+    assert report.ok
+    assert (report.scenes, report.frames, report.files) == (3, 6, 3)
+    assert report.bytes_read == sum(path.stat().st_size for path in tmp_path.glob("*.tar"))
+    shard = tmp_path / "train-000001.tar"
+    good = shard.read_bytes()
+    for bad, said in (
+        (
+            good[:5000] + bytes([good[5000] ^ 8]) + good[5001:],
+            "is damaged, its SHA-256 is not the manifest's",
+        ),
+        (good[:-1], f"has {len(good) - 1} bytes where the manifest has {len(good)}"),
+    ):
+        shard.write_bytes(bad)
+        assert [str(problem) for problem in verify_dataset(tmp_path).problems] == [f"{shard.name}: {said}"]
+    shard.rename(tmp_path / "train-000009.tar")
+    assert [str(problem) for problem in verify_dataset(tmp_path).problems] == [
+        "train-000001.tar: cannot be read: No such file or directory",
+        "train-000009.tar: is not in index.json",
+    ]
+    index = tmp_path / "index.json"
+    index.write_text(index.read_text().replace("train-0001-0007", "train-0001-0006"))
+    with pytest.raises(
+        DatasetError, match=r"index\.json: is not an index of shards \(is damaged, its SHA-256"
+    ):
+        verify_dataset(tmp_path)
+    index.write_text('{"shards": {}}')
+    with pytest.raises(DatasetError, match="has no sizes and SHA-256 of its shards"):
+        verify_dataset(tmp_path)
 
 
 def test_exporting_twice_gives_the_same_bytes(analytic_dataset: Path, tmp_path: Path) -> None:

@@ -16,9 +16,9 @@ from datagen.formats.picture import read_picture
 from datagen.formats.png import read_png_size
 from datagen.manifest import read_manifest
 from datagen.recipe import read_recipe
-from datagen.scene_check import Problem
 from datagen.shards import read_sample_member, shard_index
 from datagen.source import open_source
+from datagen.verify_report import Problem
 from workers import call_limited
 
 

@@ -28,7 +28,8 @@ from datagen.ground_truth import forward_differences, gradient_validity
 from datagen.layout import Layout
 from datagen.manifest import file_entry, read_manifest
 from datagen.recipe import read_recipe
-from datagen.verify import FEW_SCENES, VerifyReport, verify_dataset
+from datagen.verify import FEW_SCENES, verify_dataset
+from datagen.verify_report import VerifyReport
 from tests.datagen.analytic_world import commit, write_dataset
 
 

@@ -1,0 +1,51 @@
+"""What came of checking a data set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong."""
+
+    place: str
+    """The file, scene or folder, relative to the data set's root."""
+    message: str
+    split: str | None = None
+    scene: int | None = None
+    """The scene to render again; None where no scene is to blame."""
+
+    def __str__(self) -> str:
+        place = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in self.place)
+        return f"{place}: {self.message}"
+
+
+@dataclass(frozen=True)
+class VerifyReport:
+    """What was looked at and what was found."""
+
+    root: str
+    """Folder or URL."""
+    scenes: int
+    frames: int
+    files: int
+    bytes_read: int
+    seconds: float
+    problems: tuple[Problem, ...]
+
+    @property
+    def ok(self) -> bool:
+        return not self.problems
+
+    @property
+    def megabytes_per_second(self) -> float:
+        return self.bytes_read / 1e6 / self.seconds if self.seconds else 0.0
+
+    def __str__(self) -> str:
+        found = f"{len(self.problems)} problems" if self.problems else "no problem"
+        return (
+            f"{self.root}: {found} in {self.scenes} scenes, {self.frames} frames, {self.files} files, "
+            f"{self.bytes_read / 1e6:.1f} MB read in {self.seconds:.1f} s "
+            f"({self.megabytes_per_second:.0f} MB/s)"
+        )
