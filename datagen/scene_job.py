@@ -81,6 +81,7 @@ def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, 
         with watch.step("sample"):
             scene = job.recipe.sample(job.split, job.scene, attempt)
             caster = SceneRayCaster(SceneGeometry(scene))
+        with watch.step("ground_truth"):  # The tree of triangles built here serves the first frame too.
             fault = fault_before_rendering(caster, job.recipe.curation)
         frames = None if fault else _render_attempt(job, staging, caster, watch)
         if frames is not None:

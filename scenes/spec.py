@@ -104,6 +104,16 @@ def _rotation_spline(times_frames: tuple[float, ...], rotations: tuple[Quaternio
     return RotationSpline(times_frames, Rotation.from_quat([(x, y, z, w) for w, x, y, z in rotations]))
 
 
+@lru_cache(maxsize=512)
+def _turn_at(
+    times_frames: tuple[float, ...], rotations: tuple[Quaternion, ...], time_frames: float
+) -> NDArray[np.float64]:
+    """(3, 3) attitude at an instant."""
+    matrix: NDArray[np.float64] = _rotation_spline(times_frames, rotations)(time_frames).as_matrix()
+    matrix.flags.writeable = False
+    return matrix
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """A smooth rigid motion through key poses: cubic spline of positions, rotation spline of attitudes."""
@@ -127,9 +137,17 @@ class Trajectory:
         return cls(times_frames=(0.0,), positions_m=(position_m,), rotations=(rotation,))
 
     @cached_property
-    def _splines(self) -> tuple[CubicSpline, RotationSpline]:
-        turning = _rotation_spline(self.times_frames, self.rotations)
-        return CubicSpline(self.times_frames, self.positions_m), turning
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.times_frames, self.positions_m)
+
+    def _position(self, time_frames: float) -> NDArray[np.float64]:
+        """(3,) between the first and the last key."""
+        if len(self.times_frames) > 2:
+            return np.asarray(self._spline(time_frames))
+        # Through two keys the spline is a line: the same bits, without setting up hundreds of splines a street.
+        (start, end), (first, last) = self.times_frames, np.array(self.positions_m)
+        position: NDArray[np.float64] = first + (last - first) / (end - start) * (time_frames - start)
+        return position
 
     @cached_property
     def _resting(self) -> NDArray[np.float64]:
@@ -146,9 +164,8 @@ class Trajectory:
             return self._resting.copy()
         pose = np.eye(4)
         time = float(np.clip(time_frames, self.times_frames[0], self.times_frames[-1]))
-        positions, rotations = self._splines
-        pose[:3, :3] = rotations(time).as_matrix()
-        pose[:3, 3] = positions(time)
+        pose[:3, :3] = _turn_at(self.times_frames, self.rotations, time)
+        pose[:3, 3] = self._position(time)
         return pose
 
 

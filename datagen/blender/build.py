@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -28,12 +28,16 @@ class BuiltWorld:
     """One camera, moved from eye to eye."""
     objects: tuple[bpy.types.Object, ...]
     """In the order of `Scene.objects`."""
+    deformed_at: dict[int, float] = field(default_factory=dict)
+    """The instant whose vertices an object's mesh has, by the object's index."""
 
 
 def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> BuiltWorld:
     """Build everything in the geometry's scene into an empty Blender file."""
     scene = geometry.scene
-    materials = [build_material(f"material_{k}", item) for k, item in enumerate(scene.materials)]
+    # Families draw some materials that no object happens to wear: painting those would be for nothing.
+    worn = sorted({thing.material for thing in scene.objects})
+    materials = {k: build_material(f"material_{k}", scene.materials[k]) for k in worn}
     objects = _build_objects(geometry, materials, blender_scene)
     for index, light in enumerate(scene.lights):
         _build_light(index, light, blender_scene)
@@ -47,14 +51,16 @@ def place(world: BuiltWorld, eye: str, time_frames: float) -> None:
     for index, (thing, block) in enumerate(zip(world.scene.objects, world.objects, strict=True)):
         if len(thing.motion.times_frames) > 1:
             block.matrix_world = Matrix(thing.pose(time_frames).tolist())
-        if thing.deformation is not None:
+        # The second eye sees the same instant: moved again, its mesh would be handed to Cycles again.
+        if thing.deformation is not None and world.deformed_at.get(index) != time_frames:
+            world.deformed_at[index] = time_frames
             _move_vertices(block.data, world.geometry.local_vertices(index, time_frames))
     world.camera.matrix_world = Matrix(world.scene.camera.pose(eye, time_frames).tolist())
     bpy.context.view_layer.update()
 
 
 def _build_objects(
-    geometry: SceneGeometry, materials: Sequence[bpy.types.Material], blender_scene: bpy.types.Scene
+    geometry: SceneGeometry, materials: Mapping[int, bpy.types.Material], blender_scene: bpy.types.Scene
 ) -> tuple[bpy.types.Object, ...]:
     """One Blender object each; rigid ones of the same shape and material are instances of one mesh."""
     shared: dict[tuple[int, int], bpy.types.Mesh] = {}
@@ -82,7 +88,8 @@ def _build_mesh(name: str, data: Mesh, repeats: float) -> bpy.types.Mesh:
     mesh.vertices.add(len(data.vertices))
     mesh.vertices.foreach_set("co", data.vertices.astype(np.float32).ravel())
     mesh.loops.add(3 * count)
-    mesh.loops.foreach_set("vertex_index", data.triangles.astype(np.int32).ravel())
+    # The attribute behind `loops.vertex_index`, which takes an array whole instead of a number at a time.
+    mesh.attributes[".corner_vert"].data.foreach_set("value", data.triangles.astype(np.int32).ravel())
     mesh.polygons.add(count)
     mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
     mesh.polygons.foreach_set("use_smooth", np.full(count, data.smooth))

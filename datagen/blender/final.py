@@ -97,6 +97,7 @@ def _open_shutter(world: BuiltWorld, eye: str, frame: int, shutter_frames: float
             block.animation_data_clear()
         for index in deforming:
             world.objects[index].shape_key_clear()
+            world.deformed_at.pop(index, None)
         place(world, eye, float(frame))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from scenes.spec import Material
 def image_from_array(name: str, pixels: NDArray[np.uint8]) -> bpy.types.Image:
     """A Blender image with the given sRGB pixels, (H, W, 3) uint8, row 0 at the top."""
     image = bpy.data.images.new(name, pixels.shape[1], pixels.shape[0], alpha=False)
-    _set_pixels(image, pixels.astype(np.float32) / 255.0)
+    _set_pixels(image, pixels, 255.0)
     return image
 
 
@@ -21,14 +23,14 @@ def image_from_radiance(name: str, radiance: NDArray[np.float32]) -> bpy.types.I
     image = bpy.data.images.new(
         name, radiance.shape[1], radiance.shape[0], alpha=False, float_buffer=True, is_data=True
     )
-    _set_pixels(image, radiance)
+    _set_pixels(image, radiance, 1.0)
     return image
 
 
-def _set_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> None:
+def _set_pixels(image: bpy.types.Image, values: NDArray[Any], white: float) -> None:
     height, width, _ = values.shape
     rgba = np.ones((height, width, 4), np.float32)
-    rgba[:, :, :3] = values[::-1]
+    np.divide(values[::-1], np.float32(white), out=rgba[:, :, :3], dtype=np.float32, casting="same_kind")
     image.pixels.foreach_set(rgba.ravel())
     image.update()
 
