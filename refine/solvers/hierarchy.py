@@ -61,7 +61,7 @@ class Hierarchy:
 
     def _cycle(self, depth: int, b: Singles) -> Singles:
         if depth == len(self.levels):
-            return self.coarsest * b if self.coarsest.ndim == 1 else self.coarsest @ b
+            return self.coarsest * b if self.coarsest.ndim == 1 else _product(self.coarsest, b)
         level = self.levels[depth]
         chunks = _CHUNKS if b.size >= _CHUNK_FROM else 1
         x, residual = np.empty_like(b), np.empty_like(b)
@@ -440,6 +440,16 @@ def _coarse_excess(start, column, value, excess, p_start, p_value, r_start, r_co
         for e in range(r_start[j], r_start[j + 1]):
             total += r_value[e] * image[r_column[e]]
         out[j] = total
+
+
+@njit(cache=True)
+def _product(matrix, b):
+    """A small dense product: BLAS would wake threads of its own, which then wait where ours want to work."""
+    out = np.zeros(matrix.shape[0], matrix.dtype)
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            out[i] += matrix[i, j] * b[j]
+    return out
 
 
 @njit(cache=True, parallel=True)

@@ -108,7 +108,16 @@ def _bicgstab(
 
 
 def _scaled(precondition: Preconditioner, residual: Floats, norm: float) -> Singles:
-    return precondition((residual * (1 / norm)).astype(np.float32))
+    scaled = np.empty(residual.shape, np.float32)
+    _scale(residual, 1 / norm, scaled)
+    return precondition(scaled)
+
+
+@njit(cache=True, parallel=True)
+def _scale(x, factor, out):
+    for y in prange(x.shape[0]):
+        for j in range(x.shape[1]):
+            out[y, j] = factor * x[y, j]
 
 
 @njit(cache=True, parallel=True)

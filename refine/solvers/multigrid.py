@@ -59,14 +59,29 @@ class Cycle:
     def __call__(self, residual: Singles) -> Singles:
         """An approximate solution of A x = residual, padded; overwritten by the next call."""
         x, product = self._x, self._product
-        np.multiply(self._step, residual, out=x)
+        _first(self._step, residual, x)
         self._operator.apply(x, product)
-        np.subtract(residual, product, out=product)
+        _remainder(residual, product)
         self._elimination.restrict(product, self._left)
         self._elimination.prolong(self._hierarchy.correct(self._left), product, x)
         self._operator.apply(x, product)
         _smooth(self._step, residual, product, x)
         return x
+
+
+@njit(cache=True, parallel=True)
+def _first(step, residual, x):
+    for y in prange(x.shape[0]):
+        for j in range(x.shape[1]):
+            x[y, j] = step[y, j] * residual[y, j]
+
+
+@njit(cache=True, parallel=True)
+def _remainder(residual, product):
+    """residual - product, into product."""
+    for y in prange(product.shape[0]):
+        for j in range(product.shape[1]):
+            product[y, j] = residual[y, j] - product[y, j]
 
 
 @njit(cache=True, parallel=True)
