@@ -87,7 +87,8 @@ def render_dataset(
         jobs = [SceneJob(tree, area, recipe, *scene, device, executor.threads) for scene in missing]
         run = _Run(tree, recipe, log, quarantined, len(jobs), on_scene)
         run.go(executor, jobs)
-    failures = tuple(read_quarantined(tree, *scene) for scene in wanted if scene in run.quarantined)
+    asked = run.quarantined if only is None else run.quarantined & set(only)
+    failures = tuple(read_quarantined(tree, *scene) for scene in wanted if scene in asked)
     already_there = sum(scene in present for scene in wanted)
     return RenderSummary(replace(merged, scenes=recipe.scenes), run.rendered, already_there, failures)
 

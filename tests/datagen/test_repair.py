@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from datagen.executors import Failure
 from datagen.layout import Layout
+from datagen.quarantine import put_in_quarantine
 from stereoforge.cli import main
-from tests.datagen.sabotage import hashes
+from storage import LocalTree
+from tests.datagen.sabotage import RECIPE, hashes
 
 
 def verify(root: Path, *flags: str) -> int:
@@ -33,6 +36,8 @@ def test_broken_scenes_and_no_others_are_rendered_again(
     layout.manifest("train", 2).write_text("{}")
     for path in layout.scene_paths("train", 3):  # missing altogether: not broken, so not repair's business
         shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+    # Nor is what lies in quarantine since the data set was rendered.
+    put_in_quarantine(LocalTree(root), RECIPE, "train", 3, Failure("timeout", "ran too long"), 2)
     assert verify(root) == 1
     assert verify(root, "--repair") == 1
     said = capfd.readouterr()
