@@ -4,7 +4,6 @@
     python -m benchmarks.faults restarts   [--scenes 40] [--kills 20]
     python -m benchmarks.faults disk       [--scenes 12]            (as root: it mounts a small file system)
     python -m benchmarks.faults corrupt    [--trials 1000]
-    python -m benchmarks.faults vouched    [--trials 1000]
     python -m benchmarks.faults flips      [--scenes 7] [--flips 200]
     python -m benchmarks.faults memory     [--scenes 500]
     python -m benchmarks.faults throughput [--scenes 60]
@@ -30,25 +29,20 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from multiprocessing.connection import wait
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.corruption import READERS, damage, make_examples
-from datagen import Recipe, StereoDataset, render_dataset
+from datagen import Recipe, render_dataset
 from datagen.errors import DatasetError, DiskFullError
 from datagen.executors import LocalExecutor, RayExecutor, WorkerPolicy
-from datagen.export import EXPORTERS, ExportOptions
 from datagen.recipe import write_recipe
 from datagen.verify import verify_dataset
 from scenes import FAMILIES
-from storage import open_tree
-from tests.datagen.analytic_world import write_dataset
 from tests.datagen.sabotage import Sabotage, hashes, without
 from training.errors import TrainingError
-from training.weights import load_regressor
 from workers import Limits, WorkerError, WorkerProcess
 
 WORLD = FAMILIES["flying_things"].config(
@@ -212,50 +206,6 @@ def corrupt(arguments: argparse.Namespace, folder: Path) -> None:
         check(f"{name}: read or refused in a sentence", set(ends) <= {"read", "refused"})
 
 
-def vouched(arguments: argparse.Namespace, folder: Path) -> None:
-    """Damage to every kind of file that a manifest, an index or a description vouches for: none passes as data."""
-    root, shards = folder / "set", folder / "shards"
-    write_dataset(root, {"train": 1})
-    EXPORTERS["webdataset"](
-        [StereoDataset(root, "train")], open_tree(shards), ExportOptions(), lambda *_: None
-    )
-    weights = make_examples(folder)["weights"]
-    (weights.parent / "regressor.template.json").rename(weights.with_suffix(".json"))
-    files = {path.relative_to(root).parts[0]: path for path in sorted(root.rglob("*")) if path.is_file()}
-    refuses = {path: partial(_verify_refuses, root) for path in files.values()}
-    refuses |= {
-        path: partial(_verify_refuses, shards)
-        for path in (shards / "train-000000.tar", shards / "index.json")
-    }
-    refuses[weights] = _weights_refused
-    for path, refused in refuses.items():
-        good, rng, missed = path.read_bytes(), np.random.default_rng(0), 0
-        for _ in range(arguments.trials):
-            while (bad := damage(good, rng)) == good:
-                pass
-            path.write_bytes(bad)
-            missed += not refused(path)
-        path.write_bytes(good)
-        check(f"{path.relative_to(folder)}: {arguments.trials} of {arguments.trials} refused", missed == 0)
-        check(f"{path.relative_to(folder)}: not when intact", not refused(path))
-
-
-def _verify_refuses(root: Path, path: Path) -> bool:
-    try:
-        problems = verify_dataset(root, workers=None, sampled_pixels=0).problems
-    except DatasetError as error:
-        return path.name in str(error)
-    return any(problem.place == path.relative_to(root).as_posix() for problem in problems)
-
-
-def _weights_refused(path: Path) -> bool:
-    try:
-        load_regressor(path.parent)
-    except TrainingError as error:
-        return path.name in str(error)
-    return False
-
-
 def reader_process(read: Callable[[Path], object], example: Path) -> WorkerProcess:
     """A worker that has read the intact file, limited to 1 GiB more than that took."""
     first = WorkerProcess()
@@ -366,8 +316,7 @@ def throughput(arguments: argparse.Namespace, folder: Path) -> None:
 
 
 EXPERIMENTS = {
-    function.__name__: function
-    for function in (kills, restarts, disk, corrupt, vouched, flips, memory, throughput)
+    function.__name__: function for function in (kills, restarts, disk, corrupt, flips, memory, throughput)
 }
 SCENES = {"kills": 300, "restarts": 40, "disk": 12, "flips": 7, "memory": 500, "throughput": 60}
 
