@@ -43,7 +43,7 @@ class MatchingPredictor:
 
     def predict(self, left: Image, right: Image) -> Prediction:
         """Match the pair, and judge the match."""
-        return self.judge(left, *match_both(left, right, self.matcher))
+        return self.judge(left, right, *match_both(left, right, self.matcher))
 
     def predict_for(
         self, left: Image, right: Image, disparity: Map, disparity_right: Map | None
@@ -53,11 +53,11 @@ class MatchingPredictor:
             reach = max(self.matcher.max_disparity_px, math.ceil(float(np.nanmax(disparity))) + 16)
             matcher = replace(self.matcher, max_disparity_px=min(reach, left.shape[1]))
             disparity_right = match_both(left, right, matcher)[1]
-        return self.judge(left, disparity, disparity_right)
+        return self.judge(left, right, disparity, disparity_right)
 
-    def judge(self, left: Image, disparity: Map, disparity_right: Map) -> Prediction:
+    def judge(self, left: Image, right: Image, disparity: Map, disparity_right: Map) -> Prediction:
         """Confidence and gradients by the networks there are, else by hand; holes are filled from the background."""
-        judged = self.networks.predict(left, disparity, disparity_right)
+        judged = self.networks.predict(left, right, disparity, disparity_right)
         confidence, gradient = judged.confidence, judged.gradient
         if confidence is None:
             consistency = left_right_consistency(disparity, disparity_right)

@@ -78,7 +78,9 @@ def estimate(
         regression = regress(regressor, left, right)
     else:
         regression, consistency = regress_consistently(regressor, left, right)
-        confidence = confnet.confidence(left, regression.features, consistency)
+        confidence = confnet.confidence(
+            *confnet.inputs(left, right, regression.features, regression.disparity, consistency)
+        )
         confidence = resize(confidence, height, width)
     if gradnet is not None:
         gradient = resize(gradnet(left, regression.features), height, width)

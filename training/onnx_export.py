@@ -70,7 +70,8 @@ class ExportedNetworks(nn.Module):
             answers = [regression.disparity]
         else:
             regression, consistency = regress_consistently(self.regressor, left, right)
-            answers = [regression.disparity, self.confnet.confidence(left, regression.features, consistency)]
+            inputs = self.confnet.inputs(left, right, regression.features, regression.disparity, consistency)
+            answers = [regression.disparity, self.confnet.confidence(*inputs)]
         if self.gradnet is not None:
             answers.append(self.gradnet(left, regression.features))
         return tuple(answers)

@@ -70,9 +70,13 @@ class StereoPredictor:
         Raises:
             TrainingError: images of another kind, or of different sizes.
         """
-        self._check(left, right)
+        check_images(left, right)
         answer = estimate(
-            self._regressor, self._confnet, self._gradnet, self._as_tensor(left), self._as_tensor(right)
+            self._regressor,
+            self._confnet,
+            self._gradnet,
+            _as_tensor(left, self._device),
+            _as_tensor(right, self._device),
         )
         return Prediction(
             disparity=_as_array(answer.disparity)[..., 0],
@@ -82,27 +86,10 @@ class StereoPredictor:
 
     def predict_right(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
         """The right view's disparity (H, W): that of the mirrored, swapped pair, mirrored back. As `predict`."""
-        self._check(left, right)
-        views = (self._as_tensor(image[:, ::-1]) for image in (right, left))
+        check_images(left, right)
+        views = (_as_tensor(image[:, ::-1], self._device) for image in (right, left))
         mirrored = _as_array(estimate(self._regressor, None, None, *views).disparity)[..., 0]
         return np.ascontiguousarray(mirrored[:, ::-1])
-
-    @staticmethod
-    def _check(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> None:
-        for name, image in (("left", left), ("right", right)):
-            if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
-                raise TrainingError(
-                    f"the {name} image must be (H, W, 3) of uint8, got {image.shape} of {image.dtype}"
-                )
-        if left.shape != right.shape:
-            raise TrainingError(
-                f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
-                f"right {right.shape[1]}x{right.shape[0]}"
-            )
-
-    def _as_tensor(self, image: NDArray[np.uint8]) -> Tensor:
-        batch = torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1)[None]
-        return batch.to(self._device).float() / 255
 
 
 class FreePredictor:
@@ -129,18 +116,20 @@ class FreePredictor:
     def predict(
         self,
         left: NDArray[np.uint8],
+        right: NDArray[np.uint8],
         disparity: NDArray[np.float32],
         disparity_right: NDArray[np.float32],
     ) -> Prediction:
         """Confidence and gradient of a left view's disparity; the disparity itself with its holes filled.
 
         Args:
-            left: (H, W, 3) uint8 sRGB.
+            left, right: (H, W, 3) uint8 sRGB.
             disparity, disparity_right: (H, W) px, NaN in holes; the right view's confirms the left view's.
 
         Raises:
-            TrainingError: arrays of different sizes.
+            TrainingError: images of another kind, or arrays of different sizes.
         """
+        check_images(left, right)
         for name, maps in (("left", disparity), ("right", disparity_right)):
             if maps.shape != left.shape[:2]:
                 raise TrainingError(
@@ -148,14 +137,33 @@ class FreePredictor:
                     f"the image {left.shape[1]}x{left.shape[0]}"
                 )
         inputs = FreeInputs(*(maps.to(self._device) for maps in as_free_inputs(disparity, disparity_right)))
-        image = torch.from_numpy(np.ascontiguousarray(left)).permute(2, 0, 1)[None].to(self._device)
-        image, features = image.float() / 255, inputs.features
+        image, other = (_as_tensor(view, self._device) for view in (left, right))
         confidence = gradient = None
         if self._confnet is not None:
-            confidence = _as_array(self._confnet.confidence(image, features, inputs.consistency))[..., 0]
+            seen = self._confnet.inputs(image, other, inputs.features, inputs.disparity, inputs.consistency)
+            confidence = _as_array(self._confnet.confidence(*seen))[..., 0]
         if self._gradnet is not None:
-            gradient = _as_array(self._gradnet(image, features))
+            gradient = _as_array(self._gradnet(image, inputs.features))
         return Prediction(_as_array(inputs.disparity)[..., 0], confidence, gradient)
+
+
+def check_images(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> None:
+    """Raise TrainingError unless both are (H, W, 3) of uint8, not empty, and alike."""
+    for name, image in (("left", left), ("right", right)):
+        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
+            raise TrainingError(
+                f"the {name} image must be (H, W, 3) of uint8, got {image.shape} of {image.dtype}"
+            )
+    if left.shape != right.shape:
+        raise TrainingError(
+            f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
+            f"right {right.shape[1]}x{right.shape[0]}"
+        )
+
+
+def _as_tensor(image: NDArray[np.uint8], device: torch.device) -> Tensor:
+    batch = torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1)[None]
+    return batch.to(device).float() / 255
 
 
 def _as_array(maps: Tensor) -> NDArray[np.float32]:

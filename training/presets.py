@@ -3,8 +3,11 @@
 `full` is the published training: METHOD's DispNetCorr1D, ConfNet and GradNet. `small` (about 2.7 million
 parameters, a 11 MB file) and `tiny` (for minutes on a laptop's CPU) change what short runs on few pairs need
 changed, all of it here: BatchNorm, a one-sided correlation, predictions in units of 16 px, a larger learning rate
-with warm-up and a cosine end, gradient clipping, a compressed loss schedule, milder colour changes, flips, and heads
-that work at the features' half resolution.
+with warm-up and a cosine end, gradient clipping, a compressed loss schedule, milder colour changes, flips, heads
+that work at the features' half resolution, and a ConfNet that looks further around (dilations) and also sees matching
+costs around the disparity and how the disparity lies in its surroundings (`training.networks.evidence`): the features
+of a small regressor hold too little of both, and without them a random forest on features made by hand is better
+(docs/ablations.md).
 """
 
 from __future__ import annotations
@@ -230,6 +233,8 @@ FULL_CONFNET = ConfNetPreset(
     ),
     validation_interval=10_000,
 )
+WIDE_DILATIONS = (1, 2, 4, 8)
+"""With half resolution a reach of 30 pixels to every side."""
 SMALL_CONFNET = ConfNetPreset(
     steps=5000,
     batch_size=4,
@@ -237,7 +242,15 @@ SMALL_CONFNET = ConfNetPreset(
     crop_height=128,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=100),
     augmentation=SMALL_AUGMENTATION,
-    network=HeadConfig(width=32, hidden=64, dropout=0.2, normalization="batch", half_resolution=True),
+    network=HeadConfig(
+        width=32,
+        hidden=64,
+        dropout=0.2,
+        normalization="batch",
+        half_resolution=True,
+        dilations=WIDE_DILATIONS,
+        evidence=True,
+    ),
     validation_interval=500,
 )
 TINY_CONFNET = replace(

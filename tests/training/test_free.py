@@ -94,7 +94,7 @@ def test_they_learn_what_matching_gets_wrong(run: Path) -> None:
     """On a pair they have not seen, the confidence sorts out most of the wrong pixels."""
     pair = random_pair(np.random.default_rng(50), 64, 128)
     left, right = match_both(pair.left, pair.right, MATCHER)
-    answer = FreePredictor(run).predict(pair.left, left, right)
+    answer = FreePredictor(run).predict(pair.left, pair.right, left, right)
     assert answer.confidence is not None
     np.testing.assert_array_equal(answer.disparity, fill_background(left))
     wrong = np.abs(answer.disparity - pair.disparity_left) > 1
@@ -112,7 +112,7 @@ def test_they_learn_slopes(run: Path) -> None:
     rng = np.random.default_rng(51)
     pair = render([random_layer(rng, 3.0, (0.0, 0.055))], 64, 128)
     left, right = match_both(pair.left, pair.right, MATCHER)
-    answer = FreePredictor(run).predict(pair.left, left, right)
+    answer = FreePredictor(run).predict(pair.left, pair.right, left, right)
     assert answer.gradient is not None
     truth = np.diff(pair.disparity_left, axis=0)
     guesses = {
@@ -128,16 +128,16 @@ def test_they_learn_slopes(run: Path) -> None:
 def test_networks_are_optional_and_checked(run: Path, tmp_path: Path) -> None:
     pair = random_pair(np.random.default_rng(1), 33, 47)
     disparity = pair.disparity_left
-    answer = FreePredictor(run).predict(pair.left, disparity, pair.disparity_right)
+    answer = FreePredictor(run).predict(pair.left, pair.right, disparity, pair.disparity_right)
     assert answer.confidence is not None
     assert answer.confidence.shape == (33, 47)
-    bare = FreePredictor(tmp_path).predict(pair.left, disparity, pair.disparity_right)
+    bare = FreePredictor(tmp_path).predict(pair.left, pair.right, disparity, pair.disparity_right)
     assert bare.confidence is None
     assert bare.gradient is None
     with pytest.raises(TrainingError, match="no such run folder"):
         FreePredictor(tmp_path / "nothing")
     with pytest.raises(TrainingError, match="right disparity is 47x20"):
-        FreePredictor(run).predict(pair.left, disparity, pair.disparity_right[:20])
+        FreePredictor(run).predict(pair.left, pair.right, disparity, pair.disparity_right[:20])
     (tmp_path / "confnet_free.safetensors").write_bytes((run / "gradnet_free.safetensors").read_bytes())
     (tmp_path / "confnet_free.json").write_bytes((run / "gradnet_free.json").read_bytes())
     with pytest.raises(TrainingError, match="describes a gradnet_free"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from training.networks.evidence import EVIDENCE_CHANNELS, disparity_evidence
 from training.networks.heads import HeadConfig, PixelHead
 
 LRC_CEILING_PX = 20.0
@@ -12,14 +13,25 @@ LRC_CEILING_PX = 20.0
 
 
 class ConfNet(PixelHead):
-    """Left image, matching features and left-right-consistency map to logits of (wrong, correct)."""
+    """Left image, matching features, left-right-consistency map, and `disparity_evidence` if so configured, to logits
+    of (wrong, correct)."""
 
     def __init__(self, config: HeadConfig | None = None) -> None:
-        super().__init__(config or HeadConfig(), extra_channels=1, outputs=2, activation="relu")
+        config = config or HeadConfig()
+        extra_channels = 1 + (EVIDENCE_CHANNELS if config.evidence else 0)
+        super().__init__(config, extra_channels, outputs=2, activation="relu")
+
+    def inputs(
+        self, left: Tensor, right: Tensor, features: Tensor, disparity: Tensor, consistency: Tensor
+    ) -> tuple[Tensor, ...]:
+        """What `forward` takes, of a pair (B, 3, H, W) in 0..1 and what a predictor says about it."""
+        evidence = (disparity_evidence(left, right, disparity),) if self.config.evidence else ()
+        return left, features, consistency, *evidence
 
     def joined_input(self, *inputs: Tensor) -> Tensor:
-        image, features, consistency = inputs
-        return super().joined_input(image, features, consistency.clamp(max=LRC_CEILING_PX) / LRC_CEILING_PX)
+        image, features, consistency, *evidence = inputs
+        limited = consistency.clamp(max=LRC_CEILING_PX) / LRC_CEILING_PX
+        return super().joined_input(image, features, limited, *evidence)
 
     def confidence(self, *inputs: Tensor) -> Tensor:
         """P(correct), (B, 1, H, W), from the same inputs as `forward`."""

@@ -11,4 +11,7 @@ class GradNet(PixelHead):
     """Left image and matching features to (dx, dy), (B, 2, H, W), in pixels per full-resolution pixel."""
 
     def __init__(self, config: HeadConfig | None = None) -> None:
-        super().__init__(config or PUBLISHED_GRADNET, extra_channels=0, outputs=2, activation="leaky_relu")
+        config = config or PUBLISHED_GRADNET
+        if config.evidence:
+            raise ValueError("only ConfNet takes evidence about the disparity")
+        super().__init__(config, extra_channels=0, outputs=2, activation="leaky_relu")

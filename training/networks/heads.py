@@ -34,6 +34,8 @@ class HeadConfig:
     dilations: tuple[int, int, int, int] = (1, 1, 1, 1)
     """Of the 3x3 convolutions: how far apart, in pixels, they look. Features of a regressor have seen their
     surroundings already; a disparity's own have not (ours)."""
+    evidence: bool = False
+    """ConfNet also sees `training.networks.evidence.disparity_evidence` (ours)."""
 
 
 class PixelHead(nn.Module):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from matching import SGBMParameters
 from training.data import Batch
 from training.free import match_batch
 from training.losses import confidence_cross_entropy, masked_gradient_l1
@@ -36,7 +35,13 @@ class FreeConfNetTask(StereoTask):
 
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
         """What the network sees, and the disparity it is about."""
-        return free_head_inputs(batch, self.matcher, with_consistency=True)
+        with torch.no_grad():
+            left, right = batch["left"], batch["right"]
+            matched = match_batch(left, right, self.matcher)
+            inputs = self.network.inputs(
+                left, right, matched.features, matched.disparity, matched.consistency
+            )
+        return inputs, matched.disparity
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, disparity = self.head_inputs(batch)
@@ -82,7 +87,8 @@ class FreeGradNetTask(StereoTask):
 
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
         """What the network sees, and the disparity it is about."""
-        return free_head_inputs(batch, self.matcher, with_consistency=False)
+        matched = match_batch(batch["left"], batch["right"], self.matcher)
+        return (batch["left"], matched.features), matched.disparity
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, _ = self.head_inputs(batch)
@@ -101,12 +107,3 @@ class FreeGradNetTask(StereoTask):
     def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
         gradients = (batch["gradient"], maps["gradient"], maps["matched"])
         return side_by_side([image_of(batch["left"]), *(gradient_picture(map_of(g)) for g in gradients)])
-
-
-def free_head_inputs(
-    batch: Batch, matcher: SGBMParameters, with_consistency: bool
-) -> tuple[tuple[Tensor, ...], Tensor]:
-    """Image, features and, for ConfNet, the consistency map; and the disparity they are made of."""
-    matched = match_batch(batch["left"], batch["right"], matcher)
-    extra = (matched.consistency,) if with_consistency else ()
-    return (batch["left"], matched.features, *extra), matched.disparity

@@ -56,8 +56,11 @@ class ConfNetTask(HeadTask):
 
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
         with torch.no_grad():
-            regression, consistency = regress_consistently(self.regressor, batch["left"], batch["right"])
-        return (batch["left"], regression.features, consistency), regression.disparity
+            left, right = batch["left"], batch["right"]
+            regression, consistency = regress_consistently(self.regressor, left, right)
+            disparity = regression.disparity
+            inputs = self.network.inputs(left, right, regression.features, disparity, consistency)
+        return inputs, disparity
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, disparity = self.head_inputs(batch)

@@ -66,10 +66,13 @@ class JointTask(HeadTask):
         self.losses = preset
 
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
-        """What ConfNet sees (GradNet sees all but the last of it), and the disparity it is about."""
+        """What ConfNet sees (GradNet sees the first two of it), and the disparity it is about."""
         with torch.no_grad():
-            regression, consistency = regress_consistently(self.regressor, batch["left"], batch["right"])
-        return (batch["left"], regression.features, consistency), regression.disparity
+            left, right = batch["left"], batch["right"]
+            regression, consistency = regress_consistently(self.regressor, left, right)
+            disparity = regression.disparity
+            inputs = self.network.confnet.inputs(left, right, regression.features, disparity, consistency)
+        return inputs, disparity
 
     def refine(self, image: Tensor, disparity: Tensor, logits: Tensor, gradient: Tensor) -> Tensor:
         """The refined disparity (B, 1, H, W), differentiable in ConfNet's logits and GradNet's gradient."""
@@ -88,7 +91,7 @@ class JointTask(HeadTask):
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, disparity = self.head_inputs(batch)
-        logits, gradient = self.network.confnet(*inputs), self.network.gradnet(*inputs[:-1])
+        logits, gradient = self.network.confnet(*inputs), self.network.gradnet(*inputs[:2])
         own = confidence_cross_entropy(
             logits, disparity, batch["disparity"], self.losses.correct_within_px
         ) + masked_gradient_l1(gradient, batch["gradient"], self.losses.gradient_threshold_px)

@@ -1,0 +1,84 @@
+"""What speaks for and against a disparity, from the pair and the disparity itself (ours)."""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from torch import Tensor
+
+COST_OFFSETS_PX = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
+"""Matching costs are taken this far from the disparity: a right one has its least cost in the middle."""
+COST_CEILING = 0.25
+"""Larger differences of colour (of 0..1) tell no more than this does."""
+SLOPE_CEILING_PX = 4.0
+"""Larger differences between neighbours are edges and tell no more than this does."""
+RESIDUAL_WINDOWS_PX = (5, 9, 17, 33)
+RESIDUAL_CEILING_PX = 8.0
+LEFT_BORDER_CAP_PX = 160.0
+"""Columns count up to here, beyond which every disparity of interest has its match inside."""
+
+EVIDENCE_CHANNELS = len(COST_OFFSETS_PX) + 2 + 2 * len(RESIDUAL_WINDOWS_PX) + 2
+"""Channels of `disparity_evidence`."""
+
+
+def disparity_evidence(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
+    """Matching costs around a disparity, its slopes, its distance to its surroundings and their roughness, its place.
+
+    Args:
+        left, right: (B, 3, H, W) in 0..1.
+        disparity: (B, 1, H, W) px of the left view, finite.
+
+    Returns:
+        (B, `EVIDENCE_CHANNELS`, H, W), all bounded.
+    """
+    columns = torch.arange(disparity.shape[-1], device=disparity.device, dtype=disparity.dtype)
+    places = torch.cat([columns.expand_as(disparity), columns - disparity], dim=1)
+    return torch.cat(
+        [
+            matching_costs(left, right, disparity),
+            _slopes(disparity),
+            *(map_ for window in RESIDUAL_WINDOWS_PX for map_ in _surroundings(disparity, window)),
+            places.clamp(-LEFT_BORDER_CAP_PX, LEFT_BORDER_CAP_PX),
+        ],
+        dim=1,
+    )
+
+
+def matching_costs(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
+    """Mean absolute colour difference to the right view at the disparity plus each of `COST_OFFSETS_PX`.
+
+    The right view is read bilinearly; beyond its borders it repeats. Arguments as for `disparity_evidence`.
+
+    Returns:
+        (B, 9, H, W), at most `COST_CEILING`.
+    """
+    width = left.shape[-1]
+    columns = torch.arange(width, device=left.device, dtype=disparity.dtype)
+    costs = []
+    for offset in COST_OFFSETS_PX:
+        match = (columns - disparity - offset).clamp(0, width - 1)
+        before = match.floor().clamp(max=width - 2)
+        weight = match - before
+        index = before.long().expand_as(right)
+        value = right.gather(-1, index) * (1 - weight) + right.gather(-1, index + 1) * weight
+        costs.append((left - value).abs().mean(dim=1, keepdim=True))
+    return torch.cat(costs, dim=1).clamp(max=COST_CEILING)
+
+
+def _slopes(disparity: Tensor) -> Tensor:
+    along_x = F.pad(disparity[..., :, 1:] - disparity[..., :, :-1], (0, 1, 0, 0))
+    along_y = F.pad(disparity[..., 1:, :] - disparity[..., :-1, :], (0, 0, 0, 1))
+    return torch.cat([along_x, along_y], dim=1).clamp(-SLOPE_CEILING_PX, SLOPE_CEILING_PX)
+
+
+def _surroundings(disparity: Tensor, window: int) -> tuple[Tensor, Tensor]:
+    """Signed distance to the window's mean, and the mean absolute one in the window."""
+    residual = (disparity - _box_mean(disparity, window)).clamp(-RESIDUAL_CEILING_PX, RESIDUAL_CEILING_PX)
+    return residual, _box_mean(residual.abs(), window)
+
+
+def _box_mean(maps: Tensor, window: int) -> Tensor:
+    """Mean over a window, as much of it as lies inside; one direction after the other, for speed."""
+    reach = window // 2
+    rows = F.avg_pool2d(maps, (1, window), 1, (0, reach), count_include_pad=False)
+    return F.avg_pool2d(rows, (window, 1), 1, (reach, 0), count_include_pad=False)
