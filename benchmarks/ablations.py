@@ -87,7 +87,14 @@ def heads(base: ConfNetPreset | GradNetPreset, dropouts: dict[str, float]) -> di
 
 
 def confnets() -> dict[str, Preset]:
-    return heads(SMALL_CONFNET, {"dropout 0.5": 0.5, "no dropout": 0.0})
+    base = SMALL_CONFNET
+    narrow = replace(base.network, dilations=(1, 1, 1, 1))
+    return {
+        **heads(base, {"dropout 0.5": 0.5, "no dropout": 0.0}),
+        "dilations 1": replace(base, network=narrow),
+        "no evidence": replace(base, network=replace(base.network, evidence=False)),
+        "neither": replace(base, network=replace(narrow, evidence=False)),
+    }
 
 
 def gradnets() -> dict[str, Preset]:

@@ -1,5 +1,7 @@
 """ConfNet, GradNet and the left-right-consistency map."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -17,6 +19,7 @@ from training.networks import (
     left_right_consistency,
     predict_right,
 )
+from training.networks.evidence import COST_OFFSETS_PX, EVIDENCE_CHANNELS
 
 
 @pytest.mark.parametrize(
@@ -47,6 +50,25 @@ def test_outputs_cover_every_pixel(half: bool) -> None:
     assert confidence.shape == (2, 1, 32, 64)
     assert ((confidence >= 0) & (confidence <= 1)).all()
     assert GradNet(config)(image, features).shape == (2, 2, 32, 64)
+
+
+def test_confnet_sees_evidence_where_configured() -> None:
+    """The published inputs come first, and the right view changes nothing but the evidence."""
+    torch.manual_seed(0)
+    config = HeadConfig(feature_channels=5, width=4, hidden=4, evidence=True)
+    network = ConfNet(config).eval()
+    left, right, other = torch.rand(3, 1, 3, 32, 64)
+    maps = (torch.rand(1, 5, 16, 32), torch.rand(1, 1, 32, 64) * 9, torch.rand(1, 1, 32, 64))
+    joined, changed = (network.joined_input(*network.inputs(left, view, *maps)) for view in (right, other))
+    plain = ConfNet(replace(config, evidence=False))
+    assert plain.inputs(left, right, *maps) == (left, maps[0], maps[2])
+    torch.testing.assert_close(joined[:, :9], plain.joined_input(*plain.inputs(left, right, *maps)))
+    assert joined.shape == (1, 9 + EVIDENCE_CHANNELS, 32, 64)
+    differs = (joined != changed).flatten(2).any(2)[0]
+    assert differs.nonzero().flatten().tolist() == list(range(9, 9 + len(COST_OFFSETS_PX)))
+    assert network.confidence(*network.inputs(left, right, *maps)).shape == (1, 1, 32, 64)
+    with pytest.raises(ValueError, match="only ConfNet"):
+        GradNet(config)
 
 
 def test_inputs_are_standardized_with_fixed_numbers() -> None:
