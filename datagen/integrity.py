@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import io
 from collections.abc import Iterable, Iterator
 
 from datagen.dataset import StereoSample
@@ -19,20 +20,20 @@ def compare(layout: Layout, entry: FileEntry) -> tuple[int, str | None]:
         if path.exists() and not path.is_file():  # A pipe or a device would be read without end.
             raise OSError(errno.EINVAL, "it is no regular file")
         with layout.local(path).open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-            size = file.tell()
+            return compare_open(file, entry)
     except OSError as error:
         return 0, f"cannot be read: {error.strerror}"
-    return size, difference(entry, size, digest)
 
 
-def difference(entry: FileEntry, size: int, digest: str) -> str | None:
-    """Half a sentence, unless size and SHA-256 are the entry's."""
+def compare_open(file: io.BufferedIOBase, entry: FileEntry) -> tuple[int, str | None]:
+    """As `compare`, of a file that is open at its beginning. Raises OSError if it cannot be read."""
+    digest = hashlib.file_digest(file, "sha256").hexdigest()
+    size = file.tell()
     if size != entry.size:
-        return f"has {size} bytes where the manifest has {entry.size}"
+        return size, f"has {size} bytes where the manifest has {entry.size}"
     if digest != entry.sha256:
-        return "is damaged, its SHA-256 is not the manifest's"
-    return None
+        return size, "is damaged, its SHA-256 is not the manifest's"
+    return size, None
 
 
 def intact(samples: Iterable[StereoSample]) -> Iterator[StereoSample]:

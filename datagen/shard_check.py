@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
+import io
 import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from typing import IO
 
 import fsspec
 
 from datagen.errors import DatasetError
-from datagen.integrity import difference
+from datagen.integrity import compare_open
 from datagen.manifest import FileEntry
 from datagen.sources.webdataset import INDEX_NAME, ShardSetIndex, read_index
 from datagen.verify_report import Problem, VerifyReport
@@ -63,18 +62,16 @@ def verify_shards(
 def _check(tree: Tree, entry: FileEntry) -> tuple[int, Problem | None]:
     try:
         with _open(tree, entry.path) as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
-            size = file.tell()
+            size, problem = compare_open(file, entry)
     except OSError as error:
         return 0, Problem(entry.path, f"cannot be read: {error.strerror or error}")
-    problem = difference(entry, size, digest)
     return size, Problem(entry.path, problem) if problem else None
 
 
-def _open(tree: Tree, name: str) -> IO[bytes]:
+def _open(tree: Tree, name: str) -> io.BufferedIOBase:
     if isinstance(tree, LocalTree):
         return (tree.root / name).open("rb")
-    file: IO[bytes] = fsspec.open(f"{tree.name}/{name}", "rb").open()
+    file: io.BufferedIOBase = fsspec.open(f"{tree.name}/{name}", "rb").open()
     return file
 
 

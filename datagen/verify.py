@@ -53,8 +53,9 @@ def verify_dataset(
         DatasetError: For a folder that is missing or no data set at all, or a recipe or index that cannot be read.
     """
     start = time.perf_counter()
-    if has_shards(open_tree(root)):
-        return verify_shards(open_tree(root), progress, workers=workers)
+    tree = open_tree(root)
+    if has_shards(tree):
+        return verify_shards(tree, progress, workers=workers)
     with _opened(root) as layout:
         recipe = read_recipe(layout.recipe)
         checks = [

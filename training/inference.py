@@ -51,6 +51,14 @@ def regress_consistently(regressor: DispNetCorr1D, left: Tensor, right: Tensor) 
     return Regression(disparity_left, both.features[:batch]), consistency
 
 
+def confnet_inputs(
+    regressor: DispNetCorr1D, confnet: ConfNet, left: Tensor, right: Tensor
+) -> tuple[tuple[Tensor, ...], Regression]:
+    """What a ConfNet takes of images whose sides are multiples of 64, and the regression that it judges."""
+    regression, consistency = regress_consistently(regressor, left, right)
+    return confnet.inputs(left, right, regression.features, regression.disparity, consistency), regression
+
+
 def network_size(height: int, width: int) -> tuple[int, int]:
     """The next multiples of 64, which the original network resizes its input to."""
     return -(-height // STRIDE) * STRIDE, -(-width // STRIDE) * STRIDE
@@ -77,11 +85,8 @@ def estimate(
     if confnet is None:
         regression = regress(regressor, left, right)
     else:
-        regression, consistency = regress_consistently(regressor, left, right)
-        confidence = confnet.confidence(
-            *confnet.inputs(left, right, regression.features, regression.disparity, consistency)
-        )
-        confidence = resize(confidence, height, width)
+        inputs, regression = confnet_inputs(regressor, confnet, left, right)
+        confidence = resize(confnet.confidence(*inputs), height, width)
     if gradnet is not None:
         gradient = resize(gradnet(left, regression.features), height, width)
         gradient = gradient * gradient.new_tensor([1.0, stretch_y / stretch_x]).view(1, 2, 1, 1)

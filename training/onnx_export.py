@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from storage import replacing
 from training.errors import TrainingError
-from training.inference import network_size, regress, regress_consistently
+from training.inference import confnet_inputs, network_size, regress
 from training.networks import ConfNet, Correlation1D, DispNetCorr1D, GradNet
 from training.predict import StereoPredictor
 
@@ -69,8 +69,7 @@ class ExportedNetworks(nn.Module):
             regression = regress(self.regressor, left, right)
             answers = [regression.disparity]
         else:
-            regression, consistency = regress_consistently(self.regressor, left, right)
-            inputs = self.confnet.inputs(left, right, regression.features, regression.disparity, consistency)
+            inputs, regression = confnet_inputs(self.regressor, self.confnet, left, right)
             answers = [regression.disparity, self.confnet.confidence(*inputs)]
         if self.gradnet is not None:
             answers.append(self.gradnet(left, regression.features))

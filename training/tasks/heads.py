@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from training.data import Batch
-from training.inference import estimate, regress, regress_consistently
+from training.inference import confnet_inputs, estimate, regress
 from training.losses import confidence_cross_entropy, masked_gradient_l1
 from training.metrics import (
     bad_rate,
@@ -56,11 +56,8 @@ class ConfNetTask(HeadTask):
 
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
         with torch.no_grad():
-            left, right = batch["left"], batch["right"]
-            regression, consistency = regress_consistently(self.regressor, left, right)
-            disparity = regression.disparity
-            inputs = self.network.inputs(left, right, regression.features, disparity, consistency)
-        return inputs, disparity
+            inputs, regression = confnet_inputs(self.regressor, self.network, batch["left"], batch["right"])
+        return inputs, regression.disparity
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, disparity = self.head_inputs(batch)

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from refine.baselines.ours import Ours
 from refine.differentiable import image_weights, refine_batch
 from training.data import Batch
-from training.inference import estimate, regress_consistently
+from training.inference import confnet_inputs, estimate
 from training.losses import confidence_cross_entropy, masked_gradient_l1, refinement_l1
 from training.metrics import (
     bad_rate,
@@ -68,11 +68,10 @@ class JointTask(HeadTask):
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
         """What ConfNet sees (GradNet sees the first two of it), and the disparity it is about."""
         with torch.no_grad():
-            left, right = batch["left"], batch["right"]
-            regression, consistency = regress_consistently(self.regressor, left, right)
-            disparity = regression.disparity
-            inputs = self.network.confnet.inputs(left, right, regression.features, disparity, consistency)
-        return inputs, disparity
+            inputs, regression = confnet_inputs(
+                self.regressor, self.network.confnet, batch["left"], batch["right"]
+            )
+        return inputs, regression.disparity
 
     def refine(self, image: Tensor, disparity: Tensor, logits: Tensor, gradient: Tensor) -> Tensor:
         """The refined disparity (B, 1, H, W), differentiable in ConfNet's logits and GradNet's gradient."""
