@@ -92,3 +92,9 @@ def test_it_is_bounded_for_any_disparity() -> None:
     evidence = disparity_evidence(image, image, torch.rand(1, 1, 8, 400) * 1e6)
     assert torch.isfinite(evidence).all()
     assert evidence.abs().max() <= LEFT_BORDER_CAP_PX
+
+
+def test_an_image_one_pixel_wide_has_costs_too() -> None:
+    left, right = torch.full((1, 3, 5, 1), 0.5), torch.full((1, 3, 5, 1), 0.4)
+    got = matching_costs(left, right, torch.full((1, 1, 5, 1), 2.0))
+    torch.testing.assert_close(got, torch.full((1, len(COST_OFFSETS_PX), 5, 1), 0.1))

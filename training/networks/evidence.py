@@ -57,10 +57,11 @@ def matching_costs(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
     costs = []
     for offset in COST_OFFSETS_PX:
         match = (columns - disparity - offset).clamp(0, width - 1)
-        before = match.floor().clamp(max=width - 2)
+        before = match.floor()
         weight = match - before
         index = before.long().expand_as(right)
-        value = right.gather(-1, index) * (1 - weight) + right.gather(-1, index + 1) * weight
+        after = (index + 1).clamp(max=width - 1)
+        value = right.gather(-1, index) * (1 - weight) + right.gather(-1, after) * weight
         costs.append((left - value).abs().mean(dim=1, keepdim=True))
     return torch.cat(costs, dim=1).clamp(max=COST_CEILING)
 
