@@ -1,6 +1,6 @@
 """What the shape generators share: grids, tubes, welding, creases, texture coordinates.
 
-All functions are vectorised numpy on (V, 3) float64 vertices and (F, 3) triangles.
+All functions take (V, 3) float64 vertices and (F, 3) triangles.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import numpy as np
 import trimesh
 from manifold3d import CrossSection, FillRule, Manifold
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from scenes import mesh_kernels
 from scenes.mesh import Mesh
 
 Vertices = NDArray[np.float64]
@@ -38,8 +37,7 @@ def solid(
     there are no such edges).
     """
     vertices, factor = fit_to_cube(vertices)
-    vertices, triangles, kept = weld(vertices, triangles)
-    normals = scaled_normals(vertices, triangles)
+    vertices, triangles, kept, normals = _merged(vertices, triangles)
     if uv is not None:
         uv = uv[kept] * factor
     # The divergence theorem: positive when the triangles run counter-clockwise seen from outside.
@@ -48,7 +46,7 @@ def solid(
         uv = None if uv is None else uv[:, ::-1]
         normals = -normals
     if uv is None:
-        uv = _box_uv(vertices, triangles, normals)
+        uv = mesh_kernels.dominant_plane_uv(vertices, triangles, normals)
     if smooth and crease_deg is not None:
         vertices, triangles = split_creases(vertices, triangles, normals, crease_deg)
     return Mesh(
@@ -61,7 +59,7 @@ def solid(
 
 def fit_to_cube(vertices: Vertices) -> tuple[Vertices, float]:
     """Centre the bounding box and scale its longest axis to [-1, 1]; also returns the scale factor."""
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    low, high = mesh_kernels.bounds(vertices)
     factor = 2.0 / float((high - low).max())
     return (vertices - (low + high) / 2) * factor, factor
 
@@ -71,44 +69,36 @@ def weld(vertices: Vertices, triangles: Triangles) -> tuple[Vertices, Triangles,
 
     Returns the vertices in use, the remaining triangles and their indices among the given ones.
     """
-    low = vertices.min(axis=0)
-    # 21 bits an axis in one integer. The odd factor keeps 0, 1/2 and the like off the rounding boundaries.
-    cells = np.round((vertices - low) * (2097000.123 / float(np.ptp(vertices, axis=0).max()))).astype(
-        np.int64
-    )
-    keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
+    vertices, triangles, kept, _ = _merged(vertices, triangles)
+    return vertices, triangles, kept
+
+
+def _merged(
+    vertices: Vertices, triangles: Triangles
+) -> tuple[Vertices, Triangles, NDArray[np.intp], Vertices]:
+    """What `weld` returns, and the remaining triangles' scaled normals."""
+    low, high = mesh_kernels.bounds(vertices)
+    # The odd factor keeps 0, 1/2 and the like off the rounding boundaries.
+    keys = mesh_kernels.cell_keys(vertices, low, 2097000.123 / float((high - low).max()))
     order = np.argsort(keys, kind="stable")
-    new_group = np.concatenate([[True], np.diff(keys[order]) != 0])
-    label = np.empty(len(vertices), np.int64)
-    label[order] = np.cumsum(new_group) - 1
-    vertices, triangles = vertices[order[new_group]], label[triangles]
-    normals = scaled_normals(vertices, triangles)
-    kept = np.flatnonzero(np.einsum("ij,ij->i", normals, normals) > _MIN_DOUBLE_AREA**2)
-    triangles = triangles[kept]
-    used = np.zeros(len(vertices), bool)
-    used[triangles] = True
-    return vertices[used], (np.cumsum(used) - 1)[triangles], kept
+    merged: tuple[Vertices, Triangles, NDArray[np.intp], Vertices] = mesh_kernels.merged(
+        vertices, triangles, keys, order, _MIN_DOUBLE_AREA
+    )
+    return merged
 
 
 def scaled_normals(vertices: Vertices, triangles: Triangles) -> Vertices:
     """(F, 3) triangle normals, their length twice the area."""
-    origin = vertices[triangles[:, 0]]
-    one, two = vertices[triangles[:, 1]] - origin, vertices[triangles[:, 2]] - origin
-    normals = np.empty_like(one)
-    for axis, (u, v) in enumerate(((1, 2), (2, 0), (0, 1))):
-        normals[:, axis] = one[:, u] * two[:, v] - one[:, v] * two[:, u]
+    normals: Vertices = mesh_kernels.triangle_normals(vertices, triangles)
     return normals
 
 
 def box_uv(vertices: Vertices, triangles: Triangles) -> NDArray[np.float64]:
     """(F, 3, 2) texture coordinates: each triangle projected along its normal's dominant axis."""
-    return _box_uv(vertices, triangles, scaled_normals(vertices, triangles))
-
-
-def _box_uv(vertices: Vertices, triangles: Triangles, normals: Vertices) -> NDArray[np.float64]:
-    axis = np.abs(normals).argmax(axis=1)[:, None]
-    u, v = np.array([1, 0, 0])[axis], np.array([2, 2, 1])[axis]
-    return np.stack([vertices[triangles, u], vertices[triangles, v]], axis=-1)
+    uv: NDArray[np.float64] = mesh_kernels.dominant_plane_uv(
+        vertices, triangles, scaled_normals(vertices, triangles)
+    )
+    return uv
 
 
 def split_creases(
@@ -119,28 +109,13 @@ def split_creases(
     Corners of triangles are joined across edges whose dihedral angle is below `angle_deg`; each connected
     group of corners becomes one vertex.
     """
-    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
-    order = np.argsort(key, kind="stable")
-    shared = np.flatnonzero(key[order][1:] == key[order][:-1])
-    one, two = order[shared], order[shared + 1]
-    soft = np.einsum("ij,ij->i", normals[one // 3], normals[two // 3]) > np.cos(np.radians(angle_deg))
-    one, two = one[soft], two[soft]
-    # Half-edges with the same key run in opposite directions: the start of one is the end of the other.
-    rows = np.concatenate([one, _next_corner(one)])
-    columns = np.concatenate([_next_corner(two), two])
-    count = 3 * len(triangles)
-    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(count, count))
-    groups, label = connected_components(graph, directed=False)
-    split = np.empty((groups, 3))
-    split[label] = vertices[triangles.ravel()]
-    return split, label.reshape(-1, 3).astype(np.int64)
-
-
-def _next_corner(corner: NDArray[np.intp]) -> NDArray[np.intp]:
-    following: NDArray[np.intp] = corner - corner % 3 + (corner + 1) % 3
-    return following
+    split: tuple[Vertices, Triangles] = mesh_kernels.split_at_creases(
+        np.ascontiguousarray(vertices),
+        np.ascontiguousarray(triangles, np.int64),
+        np.ascontiguousarray(normals),
+        np.cos(np.radians(angle_deg)),
+    )
+    return split
 
 
 def grid_triangles(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from scenes import painting_kernels as kernels
 from scenes.drawing import choose
 
 Field = NDArray[np.float32]
@@ -149,14 +150,13 @@ def flat_colors(index: NDArray[np.integer[Any]], colors: Palette | NDArray[np.fl
 
 def smooth_step(value: Field, edge: float, width: float) -> Field:
     """0 below `edge`, 1 above, with a ramp of `width`: edges without stairs."""
-    t = np.clip((value - np.float32(edge)) / np.float32(width) + np.float32(0.5), 0.0, 1.0)
-    return t * t * (3 - 2 * t)
+    stepped: Field = kernels.smooth_stepped(value, np.float32(edge), np.float32(width))
+    return stepped
 
 
 def mix(below: Picture, above: Picture, cover: Field) -> Picture:
     """`above` painted over `below` with an opacity (H, W)."""
-    painted = (above - below) * cover
-    painted += below
+    painted: Picture = kernels.blended(below, above, cover)
     return painted
 
 
@@ -167,20 +167,13 @@ def finish(picture: Picture, rng: np.random.Generator, grain: float) -> NDArray[
     and two pixels, which is what stereo matching lives on where a pattern has none.
     """
     fine = (rng.random(picture.shape[1:], np.float32) - np.float32(0.5)) * np.float32(np.sqrt(12.0))
-    noise = fine + np.roll(fine, 1, 0)
-    noise += np.roll(noise, 1, 1)
-    noise *= np.float32(0.4 * grain)
-    noise += np.float32(0.6 * grain) * fine
-    noise += 1
-    # A little grain in the blacks too.
-    grained = picture + np.float32(12)
-    grained *= noise
-    grained -= np.float32(12)
-    return to_bytes(grained)
+    pixels: NDArray[np.uint8] = kernels.grained(
+        np.ascontiguousarray(picture), fine, np.float32(0.4 * grain), np.float32(0.6 * grain)
+    )
+    return pixels
 
 
 def to_bytes(picture: Picture) -> NDArray[np.uint8]:
     """Round to (H, W, 3) uint8."""
-    rounded = picture + np.float32(0.5)
-    np.clip(rounded, 0, 255, out=rounded)
-    return np.ascontiguousarray(rounded.astype(np.uint8).transpose(1, 2, 0))
+    pixels: NDArray[np.uint8] = kernels.to_bytes(np.ascontiguousarray(picture))
+    return pixels

@@ -77,7 +77,8 @@ def _build_objects(
         block = bpy.data.objects.new(thing.name, mesh)
         block.rotation_mode = "QUATERNION"
         blender_scene.collection.objects.link(block)
-        block.matrix_world = Matrix(thing.pose(0.0).tolist())
+        if len(thing.motion.times_frames) == 1:  # What moves is placed at each instant.
+            block.matrix_world = Matrix(thing.pose(0.0).tolist())
         objects.append(block)
     return tuple(objects)
 

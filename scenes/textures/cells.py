@@ -23,6 +23,7 @@ from scenes.painting import (
     to_unit,
     unit_grid,
 )
+from scenes.painting_kernels import nearest_of_grid
 from scenes.spec import Texture
 
 
@@ -41,20 +42,7 @@ def nearest_seeds(
     py = np.pad(points[1], 1, mode="wrap") + step[:, None]
     px, py = px.astype(np.float32).ravel(), py.astype(np.float32).ravel()
     x, y = x % 1 * np.float32(cells), y % 1 * np.float32(cells)
-    column = np.minimum(x.astype(np.int32), cells - 1)
-    row = np.minimum(y.astype(np.int32), cells - 1)
-    middle = (row + 1) * (cells + 2) + column + 1
-    first = np.full(x.shape, np.inf, np.float32)
-    second = first.copy()
-    nearest = middle.copy()
-    for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
-            index = middle + (dy * (cells + 2) + dx)
-            squared = (px[index] - x) ** 2 + (py[index] - y) ** 2
-            closer = squared < first
-            np.copyto(nearest, index, where=closer)
-            np.minimum(second, np.maximum(first, squared), out=second)
-            np.minimum(first, squared, out=first)
+    nearest, first, second = nearest_of_grid(x, y, px, py, cells)
     inner_row, inner_column = np.divmod(nearest, cells + 2)
     cell = (inner_row - 1) % cells * cells + (inner_column - 1) % cells
     return cell.astype(np.int32), np.sqrt(first), np.sqrt(second)

@@ -25,6 +25,7 @@ from scenes.painting import (
     to_unit,
     unit_grid,
 )
+from scenes.painting_kernels import put_on_top
 from scenes.spec import Texture
 
 
@@ -50,10 +51,7 @@ def heap_of_figures(
         v = cosines[i].astype(np.float32) * down - sines[i].astype(np.float32) * across
         v /= np.float32(squeezes[i])
         inside = _figure(u, v, int(kinds[i])) <= 1
-        rows = np.arange(centres[i, 0] - reach, centres[i, 0] + reach + 1) % size
-        columns = np.arange(centres[i, 1] - reach, centres[i, 1] + reach + 1) % size
-        target = np.ix_(rows, columns)
-        top[target] = np.where(inside, np.int16(i + 1), top[target])
+        put_on_top(top, inside, centres[i, 0], centres[i, 1], np.int16(i + 1))
     owner = np.maximum(top - 1, 0)
     x, y = np.meshgrid(np.arange(size), np.arange(size))
     dx = (x - centres[owner, 1] + size // 2) % size - size // 2

@@ -7,6 +7,8 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import lil_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
 from scenes.geometry import (
@@ -94,3 +96,31 @@ def test_extruding_a_triangulated_square() -> None:
     mesh = trimesh.Trimesh(*extrude_triangles(plan, np.array([(0, 1, 2), (0, 2, 3)]), 0.5), process=False)
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(1.0)
+
+
+def test_creases_of_a_random_solid_against_a_graph_of_its_corners() -> None:
+    """Groups of corners by scipy's connected components over the edges that a dictionary finds."""
+    mesh = trimesh.creation.icosphere(subdivisions=2)
+    vertices = np.array(mesh.vertices) * np.random.default_rng(5).uniform(0.6, 1.0, (len(mesh.vertices), 1))
+    triangles = np.array(mesh.faces, np.int64)
+    normals = np.cross(*(vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2)))
+    unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    faces_at: dict[tuple[int, ...], list[int]] = {}
+    for face, corners in enumerate(triangles):
+        for k in range(3):
+            faces_at.setdefault(tuple(sorted((corners[k], corners[(k + 1) % 3]))), []).append(face)
+    joined = lil_array((triangles.size, triangles.size))
+    for ends, (one, two) in faces_at.items():
+        if unit[one] @ unit[two] > np.cos(np.radians(40)):
+            for end in ends:
+                corner, other = (
+                    3 * face + int(np.flatnonzero(triangles[face] == end)[0]) for face in (one, two)
+                )
+                joined[corner, other] = 1
+    count, groups = connected_components(joined, directed=False)
+    split, split_triangles = split_creases(vertices, triangles, normals, 40.0)
+    assert len(vertices) < count < triangles.size  # Some edges are sharp, some are not.
+    assert len(split) == count
+    # scipy too counts groups by their first members.
+    np.testing.assert_array_equal(split_triangles.ravel(), groups)
+    np.testing.assert_array_equal(split[split_triangles], vertices[triangles])
