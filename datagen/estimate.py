@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -12,7 +11,7 @@ from datagen.layout import KINDS, SPLITS, Layout
 from datagen.manifest import SceneManifest, read_manifest
 from datagen.recipe import Recipe
 from datagen.render import committed_scenes, render_dataset
-from storage import open_tree
+from storage import open_tree, temporary_folder
 
 ONCE_A_SCENE = ("sample", "build")
 """The steps of a scene that its number of frames does not lengthen."""
@@ -66,11 +65,11 @@ def estimate_run(
 def _measured(recipe: Recipe, split: str, device: str) -> SceneManifest:
     """The manifest of the split's first scene, cut to one frame."""
     one = replace(recipe, world=replace(recipe.world, frames=1), scenes={split: 1})
-    with tempfile.TemporaryDirectory(prefix="stereoforge-estimate-") as folder:
-        summary = render_dataset(one, folder, workers=1, device=device)
+    with temporary_folder() as folder:
+        summary = render_dataset(one, folder / "set", workers=1, device=device)
         if summary.failures:
             raise DatasetError(f"the scene to measure could not be rendered: {summary.failures[0].reason}")
-        return read_manifest(Layout(Path(folder)).manifest(split, 0))
+        return read_manifest(Layout(folder / "set").manifest(split, 0))
 
 
 def _sizes(manifest: SceneManifest) -> tuple[int, int]:

@@ -46,9 +46,10 @@ class QuarantinedScene:
 
 
 def put_in_quarantine(
-    tree: Tree, recipe: Recipe, split: str, scene: int, failure: Failure, attempts: int
+    tree: Tree, scratch: Path, recipe: Recipe, split: str, scene: int, failure: Failure, attempts: int
 ) -> QuarantinedScene:
-    """Write down that, and why, a scene could not be rendered."""
+    """Write down that, and why, a scene could not be rendered; by way of a scratch folder, so that a run killed
+    meanwhile leaves no half of a file."""
     entry = QuarantinedScene(
         split=split,
         scene=scene,
@@ -58,8 +59,11 @@ def put_in_quarantine(
         recipe_sha256=recipe.settings_sha256(),
         record=_sample_safely(recipe, split, scene),
     )
-    tree.write(log_name(split, scene), failure.output.encode())
-    tree.write(_entry_name(split, scene), (json.dumps(asdict(entry), indent=1) + "\n").encode())
+    text = json.dumps(asdict(entry), indent=1) + "\n"
+    for name, data in ((log_name(split, scene), failure.output), (_entry_name(split, scene), text)):
+        staged = scratch / f"quarantined{Path(name).suffix}"
+        staged.write_text(data, encoding="utf-8")
+        tree.adopt(staged, name)
     return entry
 
 

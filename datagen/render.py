@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from datagen.errors import DatasetError, DiskFullError
@@ -24,7 +24,7 @@ from datagen.quarantine import (
 from datagen.recipe import Recipe, merge_into, recipe_from_text, write_recipe
 from datagen.run_log import RunLog, run_log
 from datagen.scene_job import SceneJob, render_scene
-from datagen.staging import STAGING_FOLDER, StagingArea, staging_area
+from datagen.staging import STAGING_FOLDER, StagingArea, discard_uncommitted, staging_area
 from storage import LocalTree, Tree, open_tree
 from workers import Limits, available_memory_bytes
 
@@ -85,7 +85,7 @@ def render_dataset(
         chosen = set(wanted) - quarantined if only is None else set(only)
         missing = [scene for scene in wanted if scene in chosen and scene not in present]
         jobs = [SceneJob(tree, area, recipe, *scene, device, executor.threads) for scene in missing]
-        run = _Run(tree, recipe, log, quarantined, len(jobs), on_scene)
+        run = _Run(tree, area, recipe, log, quarantined, len(jobs), on_scene)
         run.go(executor, jobs)
     asked = run.quarantined if only is None else run.quarantined & set(only)
     failures = tuple(read_quarantined(tree, *scene) for scene in wanted if scene in asked)
@@ -130,6 +130,7 @@ class _Run:
     """The outcomes of a run as they come: counted, logged, quarantined."""
 
     tree: Tree
+    area: StagingArea
     recipe: Recipe
     log: RunLog
     quarantined: set[Scene]
@@ -137,12 +138,13 @@ class _Run:
     on_scene: Callable[[int, int, SceneManifest | None], None] | None
     rendered: int = 0
     bytes_written: int = 0
+    in_flight: set[Scene] = field(default_factory=set)
 
     def go(self, executor: Executor, jobs: list[SceneJob]) -> None:
         settings = self.recipe.settings_sha256()
         self.log.write("run_started", scenes=self.total, executor=repr(executor), recipe_sha256=settings)
         try:
-            with closing(executor.run(render_scene, jobs)) as outcomes:
+            with closing(executor.run(render_scene, self._handed_out(jobs))) as outcomes:
                 for done, outcome in enumerate(outcomes, start=1):
                     self._take(outcome)
                     if self.on_scene:
@@ -150,11 +152,20 @@ class _Run:
         except BaseException as error:
             self.log.write("run_stopped", rendered=self.rendered, why=f"{type(error).__name__}: {error}")
             raise
+        finally:
+            for scene in self.in_flight:
+                discard_uncommitted(self.tree, *scene)
         self.log.write("run_finished", rendered=self.rendered, failed=self.total - self.rendered)
+
+    def _handed_out(self, jobs: Iterable[SceneJob]) -> Iterator[SceneJob]:
+        for job in jobs:
+            self.in_flight.add((job.split, job.scene))
+            yield job
 
     def _take(self, outcome: Outcome[SceneJob, SceneManifest]) -> None:
         scene = (outcome.job.split, outcome.job.scene)
         if outcome.result is not None:
+            self.in_flight.remove(scene)
             self._take_scene(scene, outcome.result, outcome.attempts)
             return
         assert outcome.failure is not None
@@ -168,7 +179,9 @@ class _Run:
         )
         if failure.kind == "disk_full" or self._no_room_left():
             raise DiskFullError(self._disk_full_sentence())
-        put_in_quarantine(self.tree, self.recipe, *scene, failure, outcome.attempts)
+        self.in_flight.remove(scene)
+        discard_uncommitted(self.tree, *scene)
+        put_in_quarantine(self.tree, self.area.folder, self.recipe, *scene, failure, outcome.attempts)
         self.quarantined.add(scene)
 
     def _take_scene(self, scene: Scene, manifest: SceneManifest, attempts: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
 from collections.abc import Callable
 from contextlib import closing
@@ -63,13 +62,10 @@ def render_scene(job: SceneJob) -> SceneManifest:
     Everything is written to a staging folder first and moved into place at the end, the manifest last, so
     that a scene with a manifest is whole whatever happens.
     """
-    staging = job.area.scene_folder(job.split, job.scene)
-    try:
+    with job.area.scene_folder(job.split, job.scene) as staging:
         watch = Stopwatch()
         statistics = _render_staged(job, staging, watch)
         return _commit(job, staging, watch, statistics)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
 
 
 def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, Any]:

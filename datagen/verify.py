@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import closing, contextmanager
@@ -18,7 +17,7 @@ from datagen.render import local_executor
 from datagen.scene_check import SAMPLED_PIXELS, SceneCheck
 from datagen.shard_check import has_shards, verify_shards
 from datagen.verify_report import Problem, VerifyReport
-from storage import LocalTree, open_tree
+from storage import LocalTree, open_tree, temporary_folder
 
 FEW_SCENES = 8
 """Fewer scenes than this are checked before other processes would have started."""
@@ -93,8 +92,8 @@ def _opened(root: Path | str) -> Iterator[Layout]:
     if isinstance(tree, LocalTree):
         yield open_layout(root)
         return
-    with tempfile.TemporaryDirectory(prefix="stereoforge-") as folder:
-        yield open_mirror(tree, Path(folder))
+    with temporary_folder() as folder:
+        yield open_mirror(tree, folder)
 
 
 def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:

@@ -7,7 +7,6 @@ folder, by the upload's end in an object store.
 from __future__ import annotations
 
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
 from storage.atomic import replacing, write_bytes
+from storage.temporary import temporary_folder
 
 
 class Tree(Protocol):
@@ -164,8 +164,8 @@ class RemoteTree:
 
     @contextmanager
     def writing(self, name: str) -> Iterator[Path]:
-        with tempfile.TemporaryDirectory(prefix="stereoforge-") as folder:
-            path = Path(folder) / PurePosixPath(name).name
+        with temporary_folder() as folder:
+            path = folder / PurePosixPath(name).name
             yield path
             self.adopt(path, name)
 

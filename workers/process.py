@@ -67,6 +67,24 @@ class _Raised:
     error: BaseException
 
 
+class _Inherited:
+    """A file descriptor for a process that is being spawned, there an open one of its own.
+
+    The duplicate is made while the process is spawned, as multiprocessing does for its connections. Made before,
+    `DupFd` would open a socket in the folder for temporary files, which stays there if this process is killed.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self.descriptor = descriptor
+
+    def __reduce__(self) -> tuple[Callable[[Any], int], tuple[Any]]:
+        return _detach, (DupFd(self.descriptor),)
+
+
+def _detach(duplicate: Any) -> int:
+    return int(duplicate.detach())
+
+
 def captured_output() -> Path | None:
     """The file that takes everything this process prints, if this is a worker process."""
     return _capture
@@ -87,7 +105,13 @@ class WorkerProcess:
         self._connection, theirs = context.Pipe()
         self._process: BaseProcess = context.Process(
             target=_serve,
-            args=(theirs, DupFd(self._output.fileno()), os.getpid(), self.limits, dict(environment or {})),
+            args=(
+                theirs,
+                _Inherited(self._output.fileno()),
+                os.getpid(),
+                self.limits,
+                dict(environment or {}),
+            ),
             name="stereoforge-worker",
         )
         self._process.start()
@@ -212,13 +236,13 @@ def _over_memory(used: int, limit: int) -> str:
 
 
 def _serve(
-    connection: Connection, output: Any, parent: int, limits: Limits, environment: dict[str, str]
+    connection: Connection, output: int, parent: int, limits: Limits, environment: dict[str, str]
 ) -> None:
     """The worker's side: calls as they come, until the other side is gone."""
     _die_with(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to handle.
     os.environ.update(environment)
-    _capture_output(output.detach())
+    _capture_output(output)
     _limit_address_space(limits)
     while True:
         try:

@@ -57,24 +57,13 @@ def start_empty_file(settings: CyclesSettings) -> bpy.types.Scene:
     """
     # The preferences are those of the start: reading them again registers every add-on anew, six times as slow.
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    _remove_temporary_folder()
     scene = bpy.context.scene
     _configure_cycles(scene, settings)
     _configure_output(scene)
     return scene
 
 
-def _remove_temporary_folder() -> None:
-    """Remove the folder that Blender makes at each start, and that a killed worker would leave in /tmp.
-
-    Nothing here puts anything into it; Blender itself does not mind that it is gone.
-    """
-    with contextlib.suppress(OSError):
-        Path(bpy.app.tempdir).rmdir()
-
-
 bpy.ops.wm.read_factory_settings(use_empty=True)  # Whatever preferences this user has for Blender.
-_remove_temporary_folder()
 
 
 def _configure_cycles(scene: bpy.types.Scene, settings: CyclesSettings) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import signal
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -26,7 +25,7 @@ from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console, progress_bar
 from stereoforge.values import parse_range, parse_shard, parse_size, shown, shown_duration
-from storage import open_tree
+from storage import open_tree, temporary_folder
 
 DEFAULT_FAMILY = "flying_things"
 DEFAULT_SCENES = 20
@@ -118,9 +117,10 @@ class Render:
             raise UsageError("--dry-run reads no --meshes, --textures or --environments: leave them out")
         if "://" in self.out:
             raise UsageError("--meshes, --textures and --environments need a folder for --out, not a URL")
-        with tempfile.TemporaryDirectory(prefix="stereoforge-assets-") as prepared:
+        with temporary_folder() as folder:
+            prepared = folder / "assets"
             imported = import_assets(
-                Path(prepared), meshes=self.meshes, textures=self.textures, environments=self.environments
+                prepared, meshes=self.meshes, textures=self.textures, environments=self.environments
             )
             for sentence in imported.skipped:
                 console.print(f"skipped {sentence}", markup=False)

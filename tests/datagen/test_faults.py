@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from functools import partial
@@ -140,22 +139,47 @@ def children_of(pid: int) -> list[int]:
     return found
 
 
-@pytest.mark.slow
-def test_ctrl_c_leaves_whole_scenes_and_nothing_else(small_reference: Path, tmp_path: Path) -> None:
-    root = tmp_path / "set"
-    # Short, since sockets are made in it, whose paths may have 107 characters.
-    temporary = Path(tempfile.mkdtemp())
-    write_recipe(tmp_path / "recipe.yaml", RECIPE)
-    command = [sys.executable, "-m", "stereoforge", "render", "--recipe", str(tmp_path / "recipe.yaml")]
-    process = subprocess.Popen(
-        [*command, "--out", str(root), "--workers", "1"],
+def start_command(folder: Path, root: Path) -> subprocess.Popen[str]:
+    """`stereoforge render` with one worker, and with `folder/temporary` for temporary files."""
+    write_recipe(folder / "recipe.yaml", RECIPE)
+    (folder / "temporary").mkdir(exist_ok=True)
+    words = ["render", "--recipe", str(folder / "recipe.yaml"), "--out", str(root), "--workers", "1"]
+    return subprocess.Popen(
+        [sys.executable, "-m", "stereoforge", *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "TMPDIR": str(temporary)},
+        env={**os.environ, "TMPDIR": str(folder / "temporary")},
         # Tests that run in a shell's background are deaf to Ctrl-C, and so would the command be.
         preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
+
+
+@pytest.mark.slow
+def test_a_killed_command_leaves_nothing_but_what_the_next_one_clears_away(
+    small_reference: Path, tmp_path: Path
+) -> None:
+    root = tmp_path / "set"
+    process = start_command(tmp_path, root)
+    deadline = time.monotonic() + 300
+    # Blender's own folder, which it has for as long as it runs.
+    while not list(root.glob(f"{STAGING_FOLDER}/*/train-*/temporary/blender_*")):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    process.kill()
+    process.communicate()
+    assert list((tmp_path / "temporary").iterdir()) == []
+    _, said = start_command(tmp_path, root).communicate()
+    assert said == ""
+    assert hashes(root) == hashes(small_reference)
+    assert not (root / STAGING_FOLDER).exists()
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+@pytest.mark.slow
+def test_ctrl_c_leaves_whole_scenes_and_nothing_else(small_reference: Path, tmp_path: Path) -> None:
+    root = tmp_path / "set"
+    process = start_command(tmp_path, root)
     deadline = time.monotonic() + 300
     while not list(root.glob("manifest/TRAIN/A/*.json")) and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -169,7 +193,7 @@ def test_ctrl_c_leaves_whole_scenes_and_nothing_else(small_reference: Path, tmp_
     while any(Path(f"/proc/{pid}").exists() for pid in workers) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert not [pid for pid in workers if Path(f"/proc/{pid}").exists()]
-    temporary.rmdir()  # nothing is left in it
+    assert list((tmp_path / "temporary").iterdir()) == []
     assert not (root / STAGING_FOLDER).exists()
     done = hashes(root)
     assert done.items() <= hashes(small_reference).items()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
-from collections.abc import Iterator
-from dataclasses import replace
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ import s3fs
 from moto.server import ThreadedMotoServer
 
 from datagen import DatasetError, StereoDataset, render_dataset
+from datagen.executors import Failure, Outcome
+from datagen.executors.base import Outcomes
 from datagen.layout import Layout
 from datagen.manifest import read_manifest, write_manifest
 from datagen.shards import CACHE_VARIABLE
@@ -68,9 +70,12 @@ def download(url: str, folder: Path) -> Path:
 
 @pytest.mark.slow
 def test_rendering_into_a_bucket_gives_the_same_data_set(
-    bucket: str, small_reference: Path, tmp_path: Path
+    bucket: str, small_reference: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    url = f"{bucket}/rendered"
+    url, temporary = f"{bucket}/rendered", tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    monkeypatch.setattr(tempfile, "tempdir", None)
     summary = render_dataset(RECIPE, url, executor=Sabotage(ONE_WORKER, {"train/0002": "raise"}))
     assert (summary.rendered, [entry.name for entry in summary.failures]) == (3, ["train/0002"])
     assert hashes(download(url, tmp_path / "part")) == without(hashes(small_reference), "0002")
@@ -80,9 +85,29 @@ def test_rendering_into_a_bucket_gives_the_same_data_set(
     assert hashes(download(url, tmp_path / "all")) == hashes(small_reference)
     logs = list((tmp_path / "all/logs").iterdir())
     assert len(logs) == 2
-    # Nothing of it stays on this machine.
-    place = hashlib.sha256(url.encode()).hexdigest()[:16]
-    assert not list(Path("/tmp").glob(f"stereoforge-staging-*-{place}"))
+    assert list(temporary.iterdir()) == []  # Nothing of it stays on this machine.
+
+
+@dataclass(frozen=True)
+class HalfWay:
+    """Gives every scene up when half of it is uploaded: with a failure, the last one by Ctrl-C."""
+
+    threads: int = 1
+
+    def run(self, function: Callable[[Any], Any], jobs: Iterable[Any]) -> Outcomes[Any, Any]:  # noqa: ARG002
+        for job in jobs:
+            job.tree.write(f"disparity/TRAIN/A/{job.scene:04d}/left/0006.pfm", b"half")
+            if job.scene == 3:
+                raise KeyboardInterrupt
+            yield Outcome(job, None, Failure("crash", "its process crashed"))
+
+
+def test_what_was_uploaded_of_an_unfinished_scene_is_removed(bucket: str) -> None:
+    url = f"{bucket}/half-way"
+    with pytest.raises(KeyboardInterrupt):
+        render_dataset(RECIPE, url, executor=HalfWay())
+    assert open_tree(url).files_below("disparity") == []
+    assert len(open_tree(url).files_below("quarantine")) == 6
 
 
 def test_a_scene_exists_once_its_manifest_is_uploaded(bucket: str, analytic_dataset: Path) -> None:

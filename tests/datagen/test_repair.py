@@ -37,7 +37,7 @@ def test_broken_scenes_and_no_others_are_rendered_again(
     for path in layout.scene_paths("train", 3):  # missing altogether: not broken, so not repair's business
         shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
     # Nor is what lies in quarantine since the data set was rendered.
-    put_in_quarantine(LocalTree(root), RECIPE, "train", 3, Failure("timeout", "ran too long"), 2)
+    put_in_quarantine(LocalTree(root), tmp_path, RECIPE, "train", 3, Failure("timeout", "ran too long"), 2)
     assert verify(root) == 1
     assert verify(root, "--repair") == 1
     said = capfd.readouterr()

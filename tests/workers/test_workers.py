@@ -143,12 +143,13 @@ def test_a_program_that_forgets_its_worker_still_ends(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_worker_dies_with_a_parent_that_is_killed(tmp_path: Path) -> None:
-    script = tmp_path / "parent.py"
+def test_a_worker_dies_with_a_parent_that_is_killed_and_nothing_is_left(tmp_path: Path) -> None:
+    script, temporary = tmp_path / "parent.py", tmp_path / "temporary"
     script.write_text(PARENT)
+    temporary.mkdir()
     parent = subprocess.Popen(
         [sys.executable, str(script)],
-        env={**os.environ, "PYTHONPATH": str(Path.cwd())},
+        env={**os.environ, "PYTHONPATH": str(Path.cwd()), "TMPDIR": str(temporary)},
         stdout=subprocess.PIPE,
         text=True,
     )
@@ -161,3 +162,4 @@ def test_a_worker_dies_with_a_parent_that_is_killed(tmp_path: Path) -> None:
     while Path(f"/proc/{worker}").exists() and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not Path(f"/proc/{worker}").exists()
+    assert list(temporary.iterdir()) == []
