@@ -28,6 +28,8 @@ from storage import (
 )
 
 STAGING_FOLDER = ".staging"
+COMMITS = "commits"
+"""Locked by all who commit scenes of an area, and by who clears it alone."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +72,7 @@ class StagingArea:
         if not self.within_tree:
             yield
             return
-        with (self.folder / f"{split}-{scene}.commit").open("w") as file:
-            with suppress(OSError):  # Where there are no locks.
-                fcntl.flock(file, fcntl.LOCK_EX)
+        with _locked(self.folder / COMMITS, fcntl.LOCK_SH), _locked(self.folder / f"{split}-{scene}.commit"):
             yield
 
 
@@ -89,11 +89,26 @@ def staging_area(tree: Tree) -> Iterator[StagingArea]:
 
 
 def _clear(tree: Tree, area: Path) -> None:
-    """Remove an area, and from the data set whatever its unfinished scenes had put there already."""
-    with suppress(FileNotFoundError):  # Somebody has removed the whole data set.
+    """Remove an area, and from the data set whatever its unfinished scenes had put there already.
+
+    A scene that another machine is committing meanwhile is waited for, and none is committed any more.
+    """
+    with (
+        suppress(FileNotFoundError),
+        _locked(area / COMMITS),
+    ):  # Somebody may have removed the whole data set.
         for split, scene in _unfinished_scenes(area):
             discard_uncommitted(tree, split, scene)
-    remove_folder(area)
+        remove_folder(area)
+
+
+@contextmanager
+def _locked(path: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
+    """Hold a lock on a file in an existing folder, which is made; where there are no locks, nothing is held."""
+    with path.open("a") as file:
+        with suppress(OSError):
+            fcntl.flock(file, kind)
+        yield
 
 
 def _unfinished_scenes(area: Path) -> set[tuple[str, int]]:

@@ -44,7 +44,7 @@ class TemporaryFolders:
         """A new folder, cleared away at the end, as are those that were abandoned beside it."""
         with self._guarding():
             self._clear_abandoned()
-            folder = Path(tempfile.mkdtemp(prefix=f"{os.getpid()}-", dir=self.parent))
+            folder = Path(tempfile.mkdtemp(prefix="", dir=self.parent))
             lock = (folder / LOCK).open("a")
             _lock(lock)
         try:
@@ -91,13 +91,13 @@ class TemporaryFolders:
                 self.clear(folder)
 
 
-def temporary_folder() -> AbstractContextManager[Path]:
-    """A new folder in the system's place for temporary files, removed at the end.
+def temporary_folder(place: Path | None = None) -> AbstractContextManager[Path]:
+    """A new folder in the system's place for temporary files, or another one, removed at the end.
 
     What killed commands of the same user have left there is removed too. Raises PermissionError if somebody
     else has made the folder that all these lie in.
     """
-    parent = Path(tempfile.gettempdir()) / f"stereoforge-{os.getuid()}"
+    parent = (place or Path(tempfile.gettempdir())) / f"stereoforge-{os.getuid()}"
     return TemporaryFolders(parent, private=True).new()
 
 

@@ -6,21 +6,27 @@ keeps one supervised process, so time limit, memory limit, retries and logs are 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+import signal
+import tempfile
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import islice
 from multiprocessing.connection import wait
+from pathlib import Path
 from typing import Any
 
 from datagen.executors.base import Failure, Job, Outcome, Outcomes, Result
 from datagen.executors.supervisor import Supervisor, WorkerPolicy
+from storage import temporary_folder
 from workers.process import POLL_S
 
 LOST_MACHINE_RETRIES = 10
 """How often Ray may run a job again whose machine or Ray worker is gone."""
 QUEUED_PER_SLOT = 2
 """Jobs given to Ray for each it can run at once: enough to keep it busy, few enough to be held anywhere."""
+LONGEST_PLACE = 10
+"""Characters of the folder for temporary files in which Ray's sockets, 97 characters further down, can be made."""
 CANCEL_ROUNDS, CANCEL_ROUND_S = 12, 5.0
 """How often running jobs are asked to end, and how long each time may take, before they are left to Ray."""
 
@@ -46,26 +52,23 @@ class RayExecutor:
 
         queue = iter(jobs)
         running: dict[Any, Job] = {}
-        with _connected(self):
+        with _connected(self, running):
             task = ray.remote(
                 num_cpus=self.cpus_per_job,
                 num_gpus=self.gpus_per_job,
                 max_calls=self.policy.jobs_per_worker,
                 max_retries=LOST_MACHINE_RETRIES,
             )(_run_supervised)
-            try:
-                while True:
-                    room = QUEUED_PER_SLOT * self._slots() - len(running)
-                    for job in islice(queue, max(0, room)):
-                        running[task.remote(function, job, self.policy)] = job
-                    if not running:
-                        return
-                    # The timeout lets machines that join the cluster get their share.
-                    done, _ = ray.wait(list(running), num_returns=1, timeout=5.0)
-                    for reference in done:
-                        yield _outcome(running.pop(reference), reference)
-            finally:
-                _cancel(list(running))
+            while True:
+                room = QUEUED_PER_SLOT * self._slots() - len(running)
+                for job in islice(queue, max(0, room)):
+                    running[task.remote(function, job, self.policy)] = job
+                if not running:
+                    return
+                # The timeout lets machines that join the cluster get their share.
+                done, _ = ray.wait(list(running), num_returns=1, timeout=5.0)
+                for reference in done:
+                    yield _outcome(running.pop(reference), reference)
 
     def _slots(self) -> int:
         """How many jobs the cluster as it is now can run at once."""
@@ -95,27 +98,42 @@ def _cancel(references: list[Any]) -> None:
 
 
 @contextmanager
-def _connected(executor: RayExecutor) -> Iterator[None]:
-    """Use the connection of this process if it has one, else make one and end it afterwards."""
+def _connected(executor: RayExecutor, running: Collection[Any]) -> Iterator[None]:
+    """Use the connection of this process if it has one, else make one; what is running at the end is ended.
+
+    With our own connection everything ends that came by it. To cancel would be a risk: a task that is done just
+    then makes Ray abort this process (Ray's issue of `submissible_tasks_`, met with Ray 2.60).
+    """
     import ray
 
     if ray.is_initialized():
-        yield
+        try:
+            yield
+        finally:
+            _cancel(list(running))
         return
-    if executor.address is None:
-        cpus = None if executor.workers is None else executor.workers * executor.cpus_per_job
-        settings: dict[str, Any] = {
-            "num_cpus": cpus,
-            "include_dashboard": False,
-            "_node_ip_address": "127.0.0.1",
-        }
-    else:
-        settings = {"address": executor.address}
-    ray.init(**settings, log_to_driver=False, logging_level="ERROR", configure_logging=True)
-    try:
-        yield
-    finally:
-        ray.shutdown()
+    with _cluster(executor) as settings:
+        before = signal.getsignal(signal.SIGTERM)
+        ray.init(**settings, log_to_driver=False, logging_level="ERROR", configure_logging=True)
+        with suppress(ValueError):  # Ray takes SIGTERM for itself, in the main thread alone.
+            signal.signal(signal.SIGTERM, before)
+        try:
+            yield
+        finally:
+            ray.shutdown()
+
+
+@contextmanager
+def _cluster(executor: RayExecutor) -> Iterator[dict[str, Any]]:
+    """What `ray.init` takes for the executor's cluster, and Ray's folder while it is one of this machine alone."""
+    if executor.address is not None:
+        yield {"address": executor.address}
+        return
+    cpus = None if executor.workers is None else executor.workers * executor.cpus_per_job
+    here = {"address": "local", "num_cpus": cpus, "include_dashboard": False, "_node_ip_address": "127.0.0.1"}
+    place = Path(tempfile.gettempdir())
+    with temporary_folder(place if len(str(place)) <= LONGEST_PLACE else Path("/tmp")) as folder:
+        yield here | {"_temp_dir": str(folder)}
 
 
 def _outcome(job: Any, reference: Any) -> Outcome[Any, Any]:

@@ -139,11 +139,12 @@ def children_of(pid: int) -> list[int]:
     return found
 
 
-def start_command(folder: Path, root: Path) -> subprocess.Popen[str]:
+def start_command(folder: Path, root: Path, executor: str = "local") -> subprocess.Popen[str]:
     """`stereoforge render` with one worker, and with `folder/temporary` for temporary files."""
     write_recipe(folder / "recipe.yaml", RECIPE)
     (folder / "temporary").mkdir(exist_ok=True)
     words = ["render", "--recipe", str(folder / "recipe.yaml"), "--out", str(root), "--workers", "1"]
+    words += ["--executor", executor]
     return subprocess.Popen(
         [sys.executable, "-m", "stereoforge", *words],
         stdout=subprocess.PIPE,
@@ -177,16 +178,19 @@ def test_a_killed_command_leaves_nothing_but_what_the_next_one_clears_away(
 
 
 @pytest.mark.slow
-def test_ctrl_c_leaves_whole_scenes_and_nothing_else(small_reference: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("executor", "number"), [("local", signal.SIGINT), ("ray", signal.SIGTERM)])
+def test_an_interrupted_command_leaves_whole_scenes_and_nothing_else(
+    small_reference: Path, tmp_path: Path, executor: str, number: signal.Signals
+) -> None:
     root = tmp_path / "set"
-    process = start_command(tmp_path, root)
+    process = start_command(tmp_path, root, executor)
     deadline = time.monotonic() + 300
     while not list(root.glob("manifest/TRAIN/A/*.json")) and time.monotonic() < deadline:
         time.sleep(0.02)
     workers = children_of(process.pid)
     assert workers
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=120)
     assert process.returncode == 130
     assert said.count("\n") == 1
     # The last to go is multiprocessing's own tracker, which ends when it sees that its parent has.
