@@ -1,7 +1,7 @@
 """What a run survives, measured. Each experiment prints its figures and fails if they are not what they must be.
 
     python -m benchmarks.faults kills      [--scenes 300] [--seconds-between-kills 4]
-    python -m benchmarks.faults restarts   [--scenes 40] [--kills 20]
+    python -m benchmarks.faults restarts   [--scenes 300] [--kills 20]
     python -m benchmarks.faults disk       [--scenes 12]            (as root: it mounts a small file system)
     python -m benchmarks.faults corrupt    [--trials 1000]
     python -m benchmarks.faults flips      [--scenes 7] [--flips 200]
@@ -141,14 +141,16 @@ def restarts(arguments: argparse.Namespace, folder: Path) -> None:
     temporary.mkdir()
     environment = {**os.environ, "TMPDIR": str(temporary)}
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment}
-    done = []
+    done, hit = [], 0
     for _ in range(arguments.kills):
         process = subprocess.Popen(command, **quiet)
         time.sleep(random.uniform(0.0, arguments.longest_run))
+        hit += process.poll() is None
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
         done.append(len(list(root.glob("manifest/TRAIN/A/*.json"))))
     print(f"  scenes committed at each kill: {done}")
+    check(f"all {arguments.kills} kills hit a running command", hit == arguments.kills)
     check("the last run succeeds", subprocess.run(command, check=False, **quiet).returncode == 0)
     check("the same SHA-256 as undisturbed", hashes(root) == hashes(folder / "undisturbed"))
     leftovers = [path for path in root.iterdir() if path.name.startswith(".")]
@@ -318,7 +320,7 @@ def throughput(arguments: argparse.Namespace, folder: Path) -> None:
 EXPERIMENTS = {
     function.__name__: function for function in (kills, restarts, disk, corrupt, flips, memory, throughput)
 }
-SCENES = {"kills": 300, "restarts": 40, "disk": 12, "flips": 7, "memory": 500, "throughput": 60}
+SCENES = {"kills": 300, "restarts": 300, "disk": 12, "flips": 7, "memory": 500, "throughput": 60}
 
 
 def main() -> None:
@@ -329,7 +331,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int)
     parser.add_argument("--seconds-between-kills", type=float, default=4.0)
     parser.add_argument("--kills", type=int, default=20)
-    parser.add_argument("--longest-run", type=float, default=30.0, help="seconds before a kill, at most")
+    parser.add_argument("--longest-run", type=float, default=8.0, help="seconds before a kill, at most")
     parser.add_argument("--trials", type=int, default=1000)
     parser.add_argument("--only", nargs="*", help="these readers of `corrupt` alone")
     parser.add_argument("--flips", type=int, default=200)
