@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from refine.mrf import checked_problem
 from refine.parameters import MRFParameters
+from refine.solvers.chessboard import eliminate_black
 from refine.solvers.krylov import krylov
 from refine.solvers.linear import SolverError
-from refine.solvers.multigrid import MAX_ITERATIONS, cycle_of
+from refine.solvers.multigrid import COLOR_SCALE, MAX_ITERATIONS, cycle_of
 from refine.solvers.stencils import Couplings, couplings_of, operator_of
 from refine.weights import NEIGHBORS, Floats
 
@@ -58,7 +59,7 @@ def posterior_deviation(
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
     parts = couplings_of(problem)
     operator = operator_of(parts, "exact")
-    cycle = cycle_of(parts, operator)
+    cycle = cycle_of(operator, *eliminate_black(parts, COLOR_SCALE))
     rng = np.random.default_rng(seed)
     total = np.zeros(problem.shape)
     for _ in range(samples):

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit, prange
 
+from refine.solvers.hierarchy import DAMPING, Hierarchy, build_hierarchy
 from refine.solvers.rows import Indices, Rows
 from refine.solvers.stencils import Couplings, Singles
 
@@ -39,14 +40,45 @@ class Elimination:
     """(H, W) 1 / diagonal at eliminated pixels, 0 elsewhere."""
     number: Indices
     """(H, W) of the pixels that are left, in reading order; -1 elsewhere."""
+    planes: Singles
+    """(6, H, W) couplings of the pixels that are left to each other, by the last six of `_AROUND`."""
 
     def restrict(self, residual: Singles, out: Singles) -> None:
-        """The right-hand side of the pixels that are left, for a residual of all."""
-        _restrict(self.ties, self.inverse, self.number, residual, out)
+        """The right-hand side of the pixels that are left, for a residual of all. At the others `out` means
+        nothing."""
+        _restrict(self.ties, self.inverse, residual, out)
 
     def prolong(self, left: Singles, residual: Singles, x: Singles) -> None:
-        """Add to `x` the solution for this residual that is `left` on the pixels that are left."""
-        _prolong(self.ties, self.inverse, self.number, left, residual, x)
+        """Add to `x` the solution for this residual that is `left` on the pixels that are left, 0 on the
+        others."""
+        _prolong(self.ties, self.inverse, left, residual, x)
+
+
+@dataclass(frozen=True)
+class GridSmoother:
+    """`refine.solvers.hierarchy.RowSmoother` for the pixels that are left, without indices."""
+
+    planes: Singles
+    step: Singles
+    """(H, W) DAMPING / diagonal, 0 at pixels that are eliminated."""
+
+    def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
+        shape = self.step.shape
+        _from_zero(self.planes, self.step, b.reshape(shape), x.reshape(shape), left.reshape(shape))
+
+    def again(self, b: Singles, x: Singles, out: Singles) -> None:
+        shape = self.step.shape
+        _again(self.planes, self.step, b.reshape(shape), x.reshape(shape), out.reshape(shape))
+
+
+def grid_hierarchy(elimination: Elimination, graph: Rows, excess: Singles) -> Hierarchy:
+    """The hierarchy below the image for vectors that are padded images, flat."""
+    hierarchy = build_hierarchy(graph, excess)
+    number = elimination.number.ravel()
+    place = np.flatnonzero(number >= 0).astype(np.int32)
+    step = np.zeros_like(elimination.inverse)
+    step.ravel()[place] = hierarchy.levels[0].smoother.step
+    return hierarchy.embedded(place, number.size, GridSmoother(elimination.planes, step))
 
 
 def eliminate_black(parts: Couplings, color_scale: float) -> tuple[Elimination, Rows, Singles]:
@@ -67,25 +99,15 @@ def eliminate_black(parts: Couplings, color_scale: float) -> tuple[Elimination, 
     left = inverse[2:-2, 2:-2] == 0
     inside[left] = np.arange(np.count_nonzero(left), dtype=np.int32)
     start = np.zeros(np.count_nonzero(left) + 1, np.int32)
-    _count(number, inverse, start)
+    planes = np.zeros((6, *number.shape), np.float32)
+    _connect(parts.weights, parts.color, scale, ties, loose, inverse, planes)
+    _count(planes, number, start)
     np.cumsum(start, out=start)
     column, value = np.empty(start[-1], np.int32), np.empty(start[-1], np.float32)
     excess = np.empty(start.size - 1, np.float32)
-    _couple(
-        parts.weights,
-        parts.color,
-        parts.tau,
-        scale,
-        ties,
-        loose,
-        inverse,
-        number,
-        start,
-        column,
-        value,
-        excess,
-    )
-    return Elimination(ties, inverse, number), Rows(start, column, value), excess
+    _list(planes, number, start, column, value)
+    _hold(parts.tau, ties, inverse, number, excess)
+    return Elimination(ties, inverse, number, planes), Rows(start, column, value), excess
 
 
 @njit(cache=True, parallel=True)
@@ -175,51 +197,59 @@ def _choose(tau, ties, loose, inverse):
                 inverse[y, x] = 1 / held
 
 
+@njit(cache=True, parallel=True)
+def _connect(weights, color, scale, ties, loose, inverse, planes):
+    """What couples the pixels that are left, square by square, (y, x) upper left."""
+    for row in prange(loose.shape[0] - 4):
+        y = np.int64(row) + 2
+        for x in range(2, loose.shape[1] - 2):
+            top, bottom = ties[0, y, x], ties[0, y + 1, x]
+            left, right = ties[1, y, x], ties[1, y, x + 1]
+            planes[0, y, x] = top if max(inverse[y, x], inverse[y, x + 1]) == 0 else 0
+            planes[3, y, x] = left if max(inverse[y, x], inverse[y + 1, x]) == 0 else 0
+            planes[1, y, x] = top * inverse[y, x + 1] * ties[0, y, x + 1]
+            planes[5, y, x] = left * inverse[y + 1, x] * ties[1, y + 1, x]
+            if (y + x) % 2 == 0:  # Black are the upper right and the lower left.
+                through = top * inverse[y, x + 1] * right + left * inverse[y + 1, x] * bottom
+                planes[4, y, x] = through + _diagonal_tie(weights, color, scale, y, x, y + 1, x + 1)
+                planes[2, y, x + 1] = loose[y, x]
+            else:
+                through = top * inverse[y, x] * left + right * inverse[y + 1, x + 1] * bottom
+                planes[2, y, x + 1] = through + _diagonal_tie(weights, color, scale, y, x + 1, y + 1, x)
+                planes[4, y, x] = loose[y, x]
+
+
 @njit(cache=True)
-def _remains(number, inverse, y, x, v, u):
-    """Whether the pixel (y, x), which is left, may be coupled to (v, u)."""
-    if number[v, u] < 0:
-        return False
-    apart = abs(v - y) == 2 or abs(u - x) == 2
-    return not apart or inverse[(y + v) // 2, (x + u) // 2] > 0
+def _coupling(planes, y, x, k):
+    """Of the pixel (y, x) towards offset k of `_AROUND`."""
+    return planes[k - 6, y, x] if k >= 6 else planes[5 - k, y + _AROUND[k, 0], x + _AROUND[k, 1]]
 
 
 @njit(cache=True, parallel=True)
-def _count(number, inverse, start):
+def _count(planes, number, start):
     for row in prange(number.shape[0] - 4):
         y = np.int64(row) + 2
         for x in range(2, number.shape[1] - 2):
             if number[y, x] >= 0:
                 count = 0
                 for k in range(12):
-                    count += _remains(number, inverse, y, x, y + _AROUND[k, 0], x + _AROUND[k, 1])
+                    count += _coupling(planes, y, x, k) > 0
                 start[number[y, x] + 1] = count
 
 
-@njit(cache=True)
-def _between(ties, y, x, v, u):
-    """The coupling of two pixels side by side or one above the other."""
-    return ties[0, y, min(x, u)] if y == v else ties[1, min(y, v), x]
-
-
-@njit(cache=True)
-def _through(ties, inverse, y, x, b, a, v, u):
-    """The coupling of (y, x) and (v, u) through the pixel (b, a) beside both, if that is eliminated."""
-    return _between(ties, y, x, b, a) * inverse[b, a] * _between(ties, b, a, v, u)
-
-
-@njit(cache=True)
-def _coupling(weights, color, scale, ties, loose, inverse, y, x, v, u):
-    """Of two pixels that are left, after the elimination."""
-    steps = abs(v - y) + abs(u - x)
-    if steps == 1:
-        return _between(ties, y, x, v, u)
-    if y == v or x == u:
-        return _through(ties, inverse, y, x, (y + v) // 2, (x + u) // 2, v, u)
-    if (y + x) % 2 == 1:
-        return loose[min(y, v), min(x, u)]
-    around = _through(ties, inverse, y, x, y, u, v, u) + _through(ties, inverse, y, x, v, x, v, u)
-    return around + _diagonal_tie(weights, color, scale, y, x, v, u)
+@njit(cache=True, parallel=True)
+def _list(planes, number, start, column, value):
+    for row in prange(number.shape[0] - 4):
+        y = np.int64(row) + 2
+        for x in range(2, number.shape[1] - 2):
+            if number[y, x] >= 0:
+                at = start[number[y, x]]
+                for k in range(12):
+                    strength = _coupling(planes, y, x, k)
+                    if strength > 0:
+                        column[at] = number[y + _AROUND[k, 0], x + _AROUND[k, 1]]
+                        value[at] = strength
+                        at += 1
 
 
 @njit(cache=True)
@@ -234,49 +264,67 @@ def _gathered(ties, inverse, values, y, x):
 
 
 @njit(cache=True, parallel=True)
-def _couple(weights, color, tau, scale, ties, loose, inverse, number, start, column, value, excess):
-    for row in prange(number.shape[0] - 4):
-        y = np.int64(row) + 2
-        for x in range(2, number.shape[1] - 2):
-            here = number[y, x]
-            if here < 0:
-                continue
-            at = start[here]
-            for k in range(12):
-                v, u = y + _AROUND[k, 0], x + _AROUND[k, 1]
-                if _remains(number, inverse, y, x, v, u):
-                    column[at] = number[v, u]
-                    value[at] = _coupling(weights, color, scale, ties, loose, inverse, y, x, v, u)
-                    at += 1
-            excess[here] = tau[y, x] + _gathered(ties, inverse, tau, y, x)
-
-
-@njit(cache=True, parallel=True)
-def _restrict(ties, inverse, number, residual, out):
+def _hold(tau, ties, inverse, number, excess):
     for row in prange(number.shape[0] - 4):
         y = np.int64(row) + 2
         for x in range(2, number.shape[1] - 2):
             if number[y, x] >= 0:
-                out[number[y, x]] = residual[y, x] + _gathered(ties, inverse, residual, y, x)
+                excess[number[y, x]] = tau[y, x] + _gathered(ties, inverse, tau, y, x)
 
 
-@njit(cache=True)
-def _at(left, number, y, x):
-    return left[number[y, x]] if number[y, x] >= 0 else np.float32(0)
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def _restrict(ties, inverse, residual, out):
+    height, width = residual.shape[0] - 4, residual.shape[1] - 4
+    for y in prange(height):
+        for x in range(width):
+            out[y + 2, x + 2] = residual[y + 2, x + 2] + _gathered(ties, inverse, residual, y + 2, x + 2)
 
 
-@njit(cache=True, parallel=True)
-def _prolong(ties, inverse, number, left, residual, x):
-    for row in prange(number.shape[0] - 4):
-        y = np.int64(row) + 2
-        for j in range(2, number.shape[1] - 2):
-            if number[y, j] >= 0:
-                x[y, j] += left[number[y, j]]
-            else:
-                around = (
-                    ties[0, y, j] * _at(left, number, y, j + 1)
-                    + ties[0, y, j - 1] * _at(left, number, y, j - 1)
-                    + ties[1, y, j] * _at(left, number, y + 1, j)
-                    + ties[1, y - 1, j] * _at(left, number, y - 1, j)
-                )
-                x[y, j] += inverse[y, j] * (residual[y, j] + around)
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def _prolong(ties, inverse, left, residual, x):
+    height, width = residual.shape[0] - 4, residual.shape[1] - 4
+    for y in prange(height):
+        for j in range(width):
+            around = residual[y + 2, j + 2] + ties[0, y + 2, j + 2] * left[y + 2, j + 3]
+            around += ties[0, y + 2, j + 1] * left[y + 2, j + 1]
+            around += ties[1, y + 2, j + 2] * left[y + 3, j + 2] + ties[1, y + 1, j + 2] * left[y + 1, j + 2]
+            x[y + 2, j + 2] += left[y + 2, j + 2] + inverse[y + 2, j + 2] * around
+
+
+@njit(cache=True, fastmath={"contract"})
+def _coupled(planes, x, y, j):
+    """The sum over the couplings of (y, j)."""
+    return (
+        planes[0, y, j] * x[y, j + 1]
+        + planes[0, y, j - 1] * x[y, j - 1]
+        + planes[1, y, j] * x[y, j + 2]
+        + planes[1, y, j - 2] * x[y, j - 2]
+        + planes[2, y, j] * x[y + 1, j - 1]
+        + planes[2, y - 1, j + 1] * x[y - 1, j + 1]
+        + planes[3, y, j] * x[y + 1, j]
+        + planes[3, y - 1, j] * x[y - 1, j]
+        + planes[4, y, j] * x[y + 1, j + 1]
+        + planes[4, y - 1, j - 1] * x[y - 1, j - 1]
+        + planes[5, y, j] * x[y + 2, j]
+        + planes[5, y - 2, j] * x[y - 2, j]
+    )
+
+
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def _from_zero(planes, step, b, x, left):
+    height, width = step.shape[0] - 4, step.shape[1] - 4
+    for y in prange(height):
+        for j in range(width):
+            x[y + 2, j + 2] = step[y + 2, j + 2] * b[y + 2, j + 2]
+    for y in prange(height):
+        for j in range(width):
+            left[y + 2, j + 2] = (1 - DAMPING) * b[y + 2, j + 2] + _coupled(planes, x, y + 2, j + 2)
+
+
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def _again(planes, step, b, x, out):
+    height, width = step.shape[0] - 4, step.shape[1] - 4
+    for y in prange(height):
+        for j in range(width):
+            total = b[y + 2, j + 2] + _coupled(planes, x, y + 2, j + 2)
+            out[y + 2, j + 2] = (1 - DAMPING) * x[y + 2, j + 2] + step[y + 2, j + 2] * total

@@ -13,17 +13,22 @@ excess beside large couplings loses nothing to rounding.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
 from refine.solvers.rows import Indices, Rows
+from refine.solvers.splitting import COARSE, split
 from refine.solvers.stencils import Singles
 
 STRENGTH = 0.5
 """A coupling is strong for i if it is at least this share of i's largest. At 0.25 the coarse levels hold
 twice the couplings, and the iterations are the same."""
+DAMPING = np.float32(0.7)
+"""Of the Jacobi smoother: as many iterations as with Gauss-Seidel, in any order and at half the time."""
 LOOSE = 0.2
 """An unknown whose couplings sum to less than this share of its diagonal is left to the smoother."""
 COARSEST = 256
@@ -32,59 +37,94 @@ _MAX_LEVELS = 30
 _STALLED = 0.9
 """Coarsening ends where a level keeps more than this share of the one above."""
 _CHUNKS = 8
-"""Parts of a level that are split and relaxed independently; a constant, so that results do not depend on threads."""
+"""Parts of a level that are split independently; a constant, so that results do not depend on threads."""
 _CHUNK_FROM = 4096
+
+
+class Smoother(Protocol):
+    """One step of damped Jacobi on a level's M-matrix. Vectors are flat."""
+
+    def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
+        """A step from 0 into `x`, and b - M x into `left`."""
+
+    def again(self, b: Singles, x: Singles, out: Singles) -> None:
+        """A step from `x`, into `out`."""
+
+
+@dataclass(frozen=True)
+class RowSmoother:
+    """On couplings by rows."""
+
+    graph: Rows
+    step: Singles
+    """DAMPING / diagonal, 0 where that is 0."""
+
+    def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
+        _from_zero(*_of(self.graph), self.step, b, x, left)
+
+    def again(self, b: Singles, x: Singles, out: Singles) -> None:
+        _again(*_of(self.graph), self.step, b, x, out)
 
 
 @dataclass(frozen=True)
 class Level:
-    """One level: its M-matrix, and how the next one is interpolated to it."""
+    """One level: how it is smoothed, and how the next one is interpolated to it."""
 
-    graph: Rows
-    """Couplings, without the diagonal."""
-    inverse_diagonal: Singles
+    smoother: Smoother
     prolong: Rows
     restrict: Rows
+    work: Singles
+    """(3, unknowns) for the cycle's own use: right-hand side, solution and what is left of the former."""
 
 
 @dataclass(frozen=True)
 class Hierarchy:
-    """From the graph that was coarsened to the coarsest."""
+    """From the graph that was coarsened to the coarsest; at least one level and that."""
 
     levels: tuple[Level, ...]
     coarsest: Singles
     """Inverse of the coarsest matrix, dense; of its diagonal alone where coarsening ended early."""
 
     def correct(self, residual: Singles) -> Singles:
-        """An approximate solution on the first level: one symmetric V-cycle."""
-        return self._cycle(0, residual)
+        """An approximate solution on the first level, by one symmetric V-cycle; overwritten by the next call."""
+        sides = [residual]
+        for level, below in pairwise((*self.levels, None)):
+            _, x, left = level.work
+            level.smoother.from_zero(sides[-1], x, left)
+            sides.append(below.work[0] if below else np.empty(level.restrict.start.size - 1, np.float32))
+            _multiply(*_of(level.restrict), left, sides[-1])
+        b = sides.pop()
+        correction = self.coarsest * b if self.coarsest.ndim == 1 else _product(self.coarsest, b)
+        for level in reversed(self.levels):
+            _, x, out = level.work
+            _multiply_add(*_of(level.prolong), correction, x)
+            level.smoother.again(sides.pop(), x, out)
+            correction = out
+        return correction
 
-    def _cycle(self, depth: int, b: Singles) -> Singles:
-        if depth == len(self.levels):
-            return self.coarsest * b if self.coarsest.ndim == 1 else _product(self.coarsest, b)
-        level = self.levels[depth]
-        chunks = _CHUNKS if b.size >= _CHUNK_FROM else 1
-        x, residual = np.empty_like(b), np.empty_like(b)
-        _relax_from_zero(*_of(level.graph), level.inverse_diagonal, b, x, chunks)
-        _residual_after(*_of(level.graph), x, residual, chunks)
-        coarse = np.empty(level.restrict.start.size - 1, np.float32)
-        multiply(*_of(level.restrict), residual, coarse)
-        correction = self._cycle(depth + 1, coarse)
-        multiply_add(*_of(level.prolong), correction, x)
-        _relax_back(*_of(level.graph), level.inverse_diagonal, b, x, residual, chunks)
-        return x
+    def embedded(self, place: NDArray[np.int32], size: int, smoother: Smoother) -> Hierarchy:
+        """The same for vectors of that size, the first level's unknowns at `place`, smoothed as given there."""
+        first = self.levels[0]
+        start = np.zeros(size + 1, np.int32)
+        start[place + 1] = np.diff(first.prolong.start)
+        np.cumsum(start, out=start)
+        prolong = Rows(start, first.prolong.column, first.prolong.value)
+        restrict = Rows(first.restrict.start, place[first.restrict.column], first.restrict.value)
+        moved = Level(smoother, prolong, restrict, np.zeros((3, size), np.float32))
+        return Hierarchy((moved, *self.levels[1:]), self.coarsest)
 
 
 def build_hierarchy(graph: Rows, excess: Singles) -> Hierarchy:
-    """Coarsen the M-matrix with these couplings (columns in order) and this excess."""
+    """Coarsen the M-matrix with these couplings and this excess."""
     levels: list[Level] = []
     kept = 0.0
-    while excess.size > COARSEST and kept <= _STALLED and len(levels) < _MAX_LEVELS:
+    while not levels or (excess.size > COARSEST and kept <= _STALLED and len(levels) < _MAX_LEVELS):
         diagonal = _diagonal(graph.start, graph.value, excess)
-        state = _split(*_of(graph), diagonal, STRENGTH, LOOSE, _bounds(diagonal.size))
-        prolong, coarse = _interpolation(graph, diagonal, state)
+        state, threshold = split(*_of(graph), diagonal, STRENGTH, LOOSE, _bounds(diagonal.size))
+        prolong, coarse = _interpolation(graph, diagonal, state, threshold)
         restrict = _transposed(prolong, coarse)
-        levels.append(Level(graph, _inverse(diagonal), prolong, restrict))
+        smoother = RowSmoother(graph, DAMPING * _inverse(diagonal))
+        levels.append(Level(smoother, prolong, restrict, np.zeros((3, excess.size), np.float32)))
         graph, excess = _galerkin(graph, diagonal, excess, prolong, restrict)
         kept = coarse / state.size
     dense = excess.size <= 4 * COARSEST
@@ -103,14 +143,16 @@ def _bounds(size: int) -> NDArray[np.int64]:
     return np.linspace(0, size, (_CHUNKS if size >= _CHUNK_FROM else 1) + 1).astype(np.int64)
 
 
-def _interpolation(graph: Rows, diagonal: Singles, state: NDArray[np.int8]) -> tuple[Rows, int]:
-    number = np.cumsum(state == _COARSE, dtype=np.int32) - np.int32(1)
+def _interpolation(
+    graph: Rows, diagonal: Singles, state: NDArray[np.int8], threshold: Singles
+) -> tuple[Rows, int]:
+    number = np.cumsum(state == COARSE, dtype=np.int32) - np.int32(1)
     coarse = int(number[-1]) + 1
     start = np.zeros(state.size + 1, np.int32)
-    _count_interpolation(*_of(graph), state, STRENGTH, start)
+    _count_interpolation(*_of(graph), state, threshold, start)
     np.cumsum(start, out=start)
     column, value = np.empty(start[-1], np.int32), np.empty(start[-1], np.float32)
-    _fill_interpolation(*_of(graph), diagonal, state, number, STRENGTH, start, column, value)
+    _fill_interpolation(*_of(graph), diagonal, state, number, threshold, start, column, value)
     return Rows(start, column, value), coarse
 
 
@@ -151,9 +193,6 @@ def _dense_inverse(graph: Rows, excess: Singles) -> Singles:
     return np.linalg.pinv((matrix + matrix.T) / 2, hermitian=True).astype(np.float32)
 
 
-_UNDECIDED, _FINE, _COARSE = 0, 1, 2
-
-
 @njit(cache=True, parallel=True)
 def _diagonal(start, value, excess):
     diagonal = np.empty(excess.size, np.float32)
@@ -166,172 +205,29 @@ def _diagonal(start, value, excess):
 
 
 @njit(cache=True, parallel=True)
-def _split(start, column, value, diagonal, strength, loose, bounds):
-    """Coarse and fine unknowns, by both passes of Ruge and Stueben 1987.
-
-    The second sees to it that two fine unknowns with a strong coupling share a coarse one; without it the
-    cycles converge several times slower. Both run in each chunk by itself, as if nothing were coupled across
-    its bounds; then the second runs over what lies at the bounds.
-    """
-    size = diagonal.size
-    threshold = np.empty(size, np.float32)
-    state = np.zeros(size, np.int8)
-    priority, seen = np.zeros(size, np.int32), np.full(size, -1, np.int32)
-    after, before = np.full(size, -1, np.int32), np.full(size, -1, np.int32)
-    for i in prange(size):
-        largest = total = np.float32(0)
-        for e in range(start[i], start[i + 1]):
-            largest = max(largest, value[e])
-            total += value[e]
-        threshold[i] = strength * largest
-        if total <= loose * diagonal[i]:
-            state[i] = _FINE
-            threshold[i] = np.inf
-    for part in prange(bounds.size - 1):
-        first, last = bounds[part], bounds[part + 1]
-        _first_pass(start, column, value, threshold, state, priority, after, before, first, last)
-        for i in range(first, last):
-            _second_pass(start, column, value, threshold, state, seen, i, first, last)
-    for part in range(bounds.size - 1):
-        first, last = bounds[part], bounds[part + 1]
-        for i in range(first, last):
-            across = start[i] < start[i + 1] and (
-                column[start[i]] < first or column[start[i + 1] - 1] >= last
-            )
-            if across:
-                _second_pass(start, column, value, threshold, state, seen, i, 0, size)
-    return state
-
-
-@njit(cache=True)
-def _second_pass(start, column, value, threshold, state, seen, i, first, last):
-    """One step of the second pass, for i, with the unknowns from first to last only."""
-    if state[i] != _FINE or threshold[i] == np.inf:
-        return
-    for e in range(start[i], start[i + 1]):
-        j = column[e]
-        if first <= j < last and state[j] == _COARSE and value[e] >= threshold[i]:
-            seen[j] = i
-    tentative = -1
-    for e in range(start[i], start[i + 1]):
-        j = column[e]
-        if not first <= j < last or state[j] != _FINE or value[e] < threshold[i] or threshold[j] == np.inf:
-            continue
-        shared = False
-        for f in range(start[j], start[j + 1]):
-            k = column[f]
-            if first <= k < last and seen[k] == i and value[f] >= threshold[j]:
-                shared = True
-                break
-        if not shared:
-            if tentative >= 0:
-                tentative = i
-                break
-            tentative = j
-            seen[j] = i
-    if tentative >= 0:
-        state[tentative] = _COARSE
-
-
-@njit(cache=True)
-def _first_pass(start, column, value, threshold, state, priority, after, before, first, last):
-    """Ruge and Stueben's first pass from first to last: next comes whatever most unknowns would gladly
-    interpolate from.
-
-    Unknowns wait in doubly linked lists, one a priority: the number of undecided unknowns that depend on
-    one strongly, plus two for each that is fine already.
-    """
-    most = 0
-    for i in range(first, last):
-        for e in range(start[i], start[i + 1]):
-            j = column[e]
-            priority[i] += first <= j < last and value[e] >= threshold[j]
-        most = max(most, start[i + 1] - start[i])
-    head = np.full(2 * most + 2, -1, np.int32)
-    for i in range(last - 1, first - 1, -1):
-        if state[i] == _UNDECIDED:
-            _insert(head, after, before, priority[i], i)
-    top = head.size - 1
-    while top >= 0:
-        i = head[top]
-        if i < 0:
-            top -= 1
-            continue
-        _remove(head, after, before, top, i)
-        state[i] = _COARSE
-        for e in range(start[i], start[i + 1]):
-            j = column[e]
-            if not first <= j < last or state[j] != _UNDECIDED:
-                continue
-            if value[e] >= threshold[j]:
-                state[j] = _FINE
-                _remove(head, after, before, priority[j], j)
-                for f in range(start[j], start[j + 1]):
-                    k = column[f]
-                    if first <= k < last and state[k] == _UNDECIDED and value[f] >= threshold[j]:
-                        _remove(head, after, before, priority[k], k)
-                        priority[k] += 1
-                        _insert(head, after, before, priority[k], k)
-                        top = max(top, priority[k])
-            elif value[e] >= threshold[i]:
-                _remove(head, after, before, priority[j], j)
-                priority[j] -= 1
-                _insert(head, after, before, priority[j], j)
-
-
-@njit(cache=True)
-def _insert(head, after, before, queue, i):
-    after[i], before[i] = head[queue], -1
-    if head[queue] >= 0:
-        before[head[queue]] = i
-    head[queue] = i
-
-
-@njit(cache=True)
-def _remove(head, after, before, queue, i):
-    if before[i] >= 0:
-        after[before[i]] = after[i]
-    else:
-        head[queue] = after[i]
-    if after[i] >= 0:
-        before[after[i]] = before[i]
-
-
-@njit(cache=True)
-def _strong(start, value, strength, i):
-    """The smallest coupling by which i interpolates."""
-    largest = np.float32(0)
-    for e in range(start[i], start[i + 1]):
-        largest = max(largest, value[e])
-    return strength * largest
-
-
-@njit(cache=True, parallel=True)
-def _count_interpolation(start, column, value, state, strength, count):
+def _count_interpolation(start, column, value, state, threshold, count):
     for i in prange(state.size):
-        if state[i] == _COARSE:
+        if state[i] == COARSE:
             count[i + 1] = 1
             continue
-        threshold = _strong(start, value, strength, i)
         for e in range(start[i], start[i + 1]):
-            if state[column[e]] == _COARSE and value[e] > 0 and value[e] >= threshold:
+            if state[column[e]] == COARSE and value[e] > 0 and value[e] >= threshold[i]:
                 count[i + 1] += 1
 
 
 @njit(cache=True, parallel=True)
-def _fill_interpolation(start, column, value, diagonal, state, number, strength, place, into, weight):
+def _fill_interpolation(start, column, value, diagonal, state, number, threshold, place, into, weight):
     """Direct interpolation: the strong coarse neighbours stand for all neighbours."""
     for i in prange(state.size):
         at = place[i]
-        if state[i] == _COARSE:
+        if state[i] == COARSE:
             into[at] = number[i]
             weight[at] = 1
             continue
-        threshold = _strong(start, value, strength, i)
         total = kept = np.float32(0)
         for e in range(start[i], start[i + 1]):
             total += value[e]
-            if state[column[e]] == _COARSE and value[e] > 0 and value[e] >= threshold:
+            if state[column[e]] == COARSE and value[e] > 0 and value[e] >= threshold[i]:
                 kept += value[e]
                 into[at] = number[column[e]]
                 weight[at] = value[e]
@@ -361,14 +257,13 @@ def _galerkin_rows(
     start, column, value, diagonal, p_start, p_column, p_value, r_start, r_column, r_value, first, last, count
 ):
     """Rows first to last of P' M P without the diagonal, as couplings."""
-    capacity = 16 * (last - first) + 64
-    columns, values = np.empty(capacity, np.int32), np.empty(capacity, np.float32)
-    where = np.full(r_start.size - 1, -1, np.int32)
-    found, sums = np.empty(4096, np.int32), np.empty(4096, np.float64)
+    columns = np.empty(16 * (last - first) + 64, np.int32)
+    values = np.empty(columns.size, np.float32)
+    met, sums = np.full(r_start.size - 1, -1, np.int32), np.empty(r_start.size - 1, np.float64)
     used = 0
     for row in range(first, last):
-        size = 0
-        where[row] = -2
+        before = used
+        met[row] = row
         for e in range(r_start[row], r_start[row + 1]):
             i = r_column[e]
             for f in range(start[i] - 1, start[i + 1]):
@@ -378,32 +273,18 @@ def _galerkin_rows(
                     k, factor = column[f], np.float64(r_value[e]) * value[f]
                 for g in range(p_start[k], p_start[k + 1]):
                     j = p_column[g]
-                    if where[j] == -1:
-                        if size == found.size:
-                            found = np.concatenate((found, np.empty_like(found)))
-                            sums = np.concatenate((sums, np.empty_like(sums)))
-                        where[j] = size
-                        found[size] = j
-                        sums[size] = 0
-                        size += 1
-                    if where[j] >= 0:
-                        sums[where[j]] += factor * p_value[g]
-        if used + size > columns.size:
-            columns = np.concatenate((columns, np.empty(columns.size + size, np.int32)))
-            values = np.concatenate((values, np.empty(values.size + size, np.float32)))
-        for at in range(1, size):
-            j, before = found[at], at
-            while before > 0 and found[before - 1] > j:
-                found[before] = found[before - 1]
-                before -= 1
-            found[before] = j
-        for at in range(size):
-            columns[used + at] = found[at]
-            values[used + at] = sums[where[found[at]]]
-            where[found[at]] = -1
-        where[row] = -1
-        used += size
-        count[row + 1] = size
+                    if met[j] != row:
+                        met[j] = row
+                        sums[j] = 0
+                        if used == columns.size:
+                            columns = np.concatenate((columns, np.empty_like(columns)))
+                            values = np.concatenate((values, np.empty_like(values)))
+                        columns[used] = j
+                        used += 1
+                    sums[j] += factor * p_value[g]
+        for at in range(before, used):
+            values[at] = sums[columns[at]]
+        count[row + 1] = used - before
     return columns[:used].copy(), values[:used].copy()
 
 
@@ -453,7 +334,7 @@ def _product(matrix, b):
 
 
 @njit(cache=True, parallel=True)
-def multiply(start, column, value, x, out):
+def _multiply(start, column, value, x, out):
     """out = R x."""
     for i in prange(out.size):
         total = np.float32(0)
@@ -463,7 +344,7 @@ def multiply(start, column, value, x, out):
 
 
 @njit(cache=True, parallel=True)
-def multiply_add(start, column, value, x, out):
+def _multiply_add(start, column, value, x, out):
     """out += R x."""
     for i in prange(out.size):
         total = np.float32(0)
@@ -473,57 +354,20 @@ def multiply_add(start, column, value, x, out):
 
 
 @njit(cache=True, parallel=True)
-def _relax_from_zero(start, column, value, inverse, b, x, chunks):
-    """A forward Gauss-Seidel sweep from x = 0, in each chunk by itself. Columns are in order."""
-    size = b.size
-    for part in prange(chunks):
-        chunk = np.int64(part)  # numba's parallel indices are unsigned
-        first, last = size * chunk // chunks, size * (chunk + 1) // chunks
-        for i in range(first, last):
-            total = b[i]
-            for e in range(start[i], start[i + 1]):
-                j = column[e]
-                if j > i:
-                    break
-                if j >= first:
-                    total += value[e] * x[j]
-            x[i] = total * inverse[i]
+def _from_zero(start, column, value, step, b, x, left):
+    for i in prange(b.size):
+        x[i] = step[i] * b[i]
+    for i in prange(b.size):
+        total = (1 - DAMPING) * b[i]
+        for e in range(start[i], start[i + 1]):
+            total += value[e] * x[column[e]]
+        left[i] = total
 
 
 @njit(cache=True, parallel=True)
-def _residual_after(start, column, value, x, out, chunks):
-    """What `_relax_from_zero` leaves: only the couplings it did not look at."""
-    size = x.size
-    for part in prange(chunks):
-        chunk = np.int64(part)
-        first, last = size * chunk // chunks, size * (chunk + 1) // chunks
-        for i in range(first, last):
-            total = np.float32(0)
-            for e in range(start[i + 1] - 1, start[i] - 1, -1):
-                j = column[e]
-                if j < i:
-                    break
-                total += value[e] * x[j]
-            for e in range(start[i], start[i + 1]):
-                j = column[e]
-                if j >= first:
-                    break
-                total += value[e] * x[j]
-            out[i] = total
-
-
-@njit(cache=True, parallel=True)
-def _relax_back(start, column, value, inverse, b, x, old, chunks):
-    """A backward Gauss-Seidel sweep; other chunks' unknowns count as they were before."""
-    size = b.size
-    for i in prange(size):
-        old[i] = x[i]
-    for part in prange(chunks):
-        chunk = np.int64(part)
-        first, last = size * chunk // chunks, size * (chunk + 1) // chunks
-        for i in range(last - 1, first - 1, -1):
-            total = b[i]
-            for e in range(start[i], start[i + 1]):
-                j = column[e]
-                total += value[e] * (x[j] if first <= j < last else old[j])
-            x[i] = total * inverse[i]
+def _again(start, column, value, step, b, x, out):
+    for i in prange(b.size):
+        total = b[i]
+        for e in range(start[i], start[i + 1]):
+            total += value[e] * x[column[e]]
+        out[i] = (1 - DAMPING) * x[i] + step[i] * total

@@ -25,12 +25,12 @@ def krylov(
 ) -> LinearSolution:
     """Conjugate gradients for a symmetric operator, BiCGSTAB for another, until |b - A x| <= tolerance |b|.
 
-    Arrays padded. The preconditioner works in float32 on residuals scaled to norm 1, so that tight tolerances
-    do not sink below its range. A BiCGSTAB iteration costs about two of CG.
+    Arrays padded; `start` is overwritten. The preconditioner works in float32 on residuals scaled to norm 1, so
+    that tight tolerances do not sink below its range. A BiCGSTAB iteration costs about two of CG.
     """
     method = _conjugate_gradients if operator.symmetric else _bicgstab
     size = float(np.linalg.norm(right_hand_side)) or 1.0
-    x = start.copy()
+    x = start
     with np.errstate(all="ignore"):  # a breakdown shows as a residual that is not finite
         iterations = method(operator, right_hand_side, x, tolerance * size, precondition, max_iterations)
     residual = np.zeros_like(x)

@@ -14,11 +14,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from refine.solvers.chessboard import Elimination, eliminate_black
-from refine.solvers.hierarchy import Hierarchy, build_hierarchy
+from refine.solvers.chessboard import Elimination, eliminate_black, grid_hierarchy
+from refine.solvers.hierarchy import Hierarchy
 from refine.solvers.krylov import krylov
 from refine.solvers.linear import LinearSolution, Problem
-from refine.solvers.stencils import Couplings, Singles, StencilOperator, couplings_of, operator_of, pad
+from refine.solvers.rows import Rows
+from refine.solvers.stencils import Singles, StencilOperator, couplings_of, operator_of, pad
 
 MAX_ITERATIONS = 200
 COLOR_SCALE = 0.5
@@ -32,17 +33,18 @@ def solve_multigrid(problem: Problem, tolerance: float) -> LinearSolution:
     preconditioner."""
     parts = couplings_of(problem)
     operator = operator_of(parts, problem.form)
-    cycle = cycle_of(parts, operator)
     right_hand_side = parts.right_hand_side
-    del parts  # the pixels' weights are in the operator now
+    reduced = eliminate_black(parts, COLOR_SCALE)
+    del parts  # the pixels' weights are in the operator and the reduced graph now
+    cycle = cycle_of(operator, *reduced)
+    del reduced
     start = pad(problem.start, np.float64)
     return krylov(operator, right_hand_side, start, tolerance, cycle, MAX_ITERATIONS)
 
 
-def cycle_of(parts: Couplings, operator: StencilOperator) -> Cycle:
-    """The preconditioner for one form's operator."""
-    elimination, graph, excess = eliminate_black(parts, COLOR_SCALE)
-    return Cycle(operator, elimination, build_hierarchy(graph, excess))
+def cycle_of(operator: StencilOperator, elimination: Elimination, graph: Rows, excess: Singles) -> Cycle:
+    """The preconditioner for one form's operator, of what `eliminate_black` makes with `COLOR_SCALE`."""
+    return Cycle(operator, elimination, grid_hierarchy(elimination, graph, excess))
 
 
 class Cycle:
@@ -54,7 +56,7 @@ class Cycle:
         self._hierarchy = hierarchy
         self._step = DAMPING * operator.inverse_diagonal()
         self._x, self._product = np.zeros_like(operator.tau), np.zeros_like(operator.tau)
-        self._left = np.empty(elimination.number.max() + 1, np.float32)
+        self._left = np.zeros_like(operator.tau)
 
     def __call__(self, residual: Singles) -> Singles:
         """An approximate solution of A x = residual, padded; overwritten by the next call."""
@@ -63,7 +65,8 @@ class Cycle:
         self._operator.apply(x, product)
         _remainder(residual, product)
         self._elimination.restrict(product, self._left)
-        self._elimination.prolong(self._hierarchy.correct(self._left), product, x)
+        correction = self._hierarchy.correct(self._left.ravel())
+        self._elimination.prolong(correction.reshape(x.shape), product, x)
         self._operator.apply(x, product)
         _smooth(self._step, residual, product, x)
         return x

@@ -343,6 +343,24 @@ def test_eliminating_black_pixels_is_the_schur_complement(height, width):
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.parametrize("style", ["smooth", "noise", "mixed"])
+def test_the_first_level_is_smoothed_alike_as_an_image_and_by_rows(style):
+    from refine.solvers.chessboard import eliminate_black, grid_hierarchy
+    from refine.solvers.hierarchy import build_hierarchy
+    from refine.solvers.linear import Problem as Checked
+    from refine.solvers.stencils import couplings_of
+
+    problem = random_problem(45, 62, seed=5, style=style)
+    checked = Checked(*problem.inputs, DEFAULTS, "exact", problem.disparity)
+    elimination, graph, excess = eliminate_black(couplings_of(checked), 0.5)
+    place = elimination.number.ravel() >= 0
+    right_hand_side = np.random.default_rng(0).normal(size=place.size).astype(np.float32)
+    expected = build_hierarchy(graph, excess).correct(right_hand_side[place])
+    found = grid_hierarchy(elimination, graph, excess).correct(right_hand_side)
+    np.testing.assert_allclose(found[place], expected, rtol=1e-4, atol=1e-6)
+    assert not found[~place].any()
+
+
 def with_detours(matrix, width):
     """The M-matrix after two black pixels' couplings took the way over a pixel beside both that is three times
     as strongly coupled to one of them; sums of rows as they were."""
