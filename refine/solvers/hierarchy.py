@@ -13,7 +13,6 @@ excess beside large couplings loses nothing to rounding.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -28,7 +27,7 @@ STRENGTH = 0.5
 """A coupling is strong for i if it is at least this share of i's largest. At 0.25 the coarse levels hold
 twice the couplings, and the iterations are the same."""
 DAMPING = np.float32(0.7)
-"""Of the Jacobi smoother: as many iterations as with Gauss-Seidel, in any order and at half the time."""
+"""Of the Jacobi smoother, which takes as many iterations as Gauss-Seidel and no order (docs/solver.md)."""
 LOOSE = 0.2
 """An unknown whose couplings sum to less than this share of its diagonal is left to the smoother."""
 COARSEST = 256
@@ -44,6 +43,10 @@ _CHUNK_FROM = 4096
 class Smoother(Protocol):
     """One step of damped Jacobi on a level's M-matrix. Vectors are flat."""
 
+    @property
+    def step(self) -> Singles:
+        """DAMPING / diagonal, 0 where that is 0."""
+
     def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
         """A step from 0 into `x`, and b - M x into `left`."""
 
@@ -57,7 +60,6 @@ class RowSmoother:
 
     graph: Rows
     step: Singles
-    """DAMPING / diagonal, 0 where that is 0."""
 
     def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
         _from_zero(*_of(self.graph), self.step, b, x, left)
@@ -88,7 +90,7 @@ class Hierarchy:
     def correct(self, residual: Singles) -> Singles:
         """An approximate solution on the first level, by one symmetric V-cycle; overwritten by the next call."""
         sides = [residual]
-        for level, below in pairwise((*self.levels, None)):
+        for level, below in zip(self.levels, (*self.levels[1:], None), strict=True):
             _, x, left = level.work
             level.smoother.from_zero(sides[-1], x, left)
             sides.append(below.work[0] if below else np.empty(level.restrict.start.size - 1, np.float32))

@@ -219,7 +219,7 @@ class DenseTGV:
         self.weight = method.data_weight * frame.confidence.ravel().astype(float)
         place = np.arange(size).reshape(height, width)
         tensors = self.tensors(frame.image, method.tensor_strength, method.tensor_exponent)
-        norms = []
+        norms: list[tuple[float, np.ndarray]] = []
         for y in range(height):
             for x in range(width):
                 steps = np.zeros((2, 3 * size))
@@ -242,7 +242,7 @@ class DenseTGV:
         grey = np.array([np.convolve(row, bell, "valid") for row in grey])
         grey = np.array([np.convolve(column, bell, "valid") for column in grey.T]).T
         height, width = grey.shape
-        made = []
+        made: list[list[np.ndarray]] = []
         for y in range(height):
             made.append([])
             for x in range(width):
