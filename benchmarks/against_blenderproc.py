@@ -6,9 +6,11 @@ Scenes of flying_things with 30 objects. BlenderProc is given each as a .blend f
 neither samples nor paints nor makes meshes, and it renders pictures and depth only; StereoForge runs as it always does:
 it samples, builds, renders, makes all ground truth and writes a checked data set. Three settings of BlenderProc:
 
-    shipped        as it comes: up to 1024 samples, its denoiser in the compositor, one process
-    own-denoiser   the same with StereoForge's number of samples
-    chosen         StereoForge's settings of Cycles, one process a core with one thread each
+    chosen    StereoForge's settings of Cycles, some of which take Blender's own interface
+    api       those of them that BlenderProc's functions can set, so with its own denoiser; --api-samples
+    shipped   as it comes: up to 1024 samples, its own denoiser
+
+The first two as one process a core with one thread each, the last as one process with all cores.
 
 PATH is a Python 3.11 with bpy and what docs/tutorials/bpy_module.md of BlenderProc lists, and a clone of BlenderProc
 on its path: the release 2.8.0 cannot use a bpy from outside yet. PSNR is of the developed left pictures, against
@@ -44,7 +46,7 @@ from datagen.recipe import write_recipe
 from datagen.scene_geometry import SceneGeometry
 from scenes import FAMILIES, Scene
 
-SETTINGS = ("chosen", "own-denoiser", "shipped")
+SETTINGS = ("chosen", "api", "shipped")
 SAMPLES = 4
 
 
@@ -173,9 +175,9 @@ def run_ours(recipe: Recipe, quality_scenes: int, out: Path) -> Run:
 
 
 def run_blenderproc(
-    setting: str, python: Path, recipe: Recipe, scenes: int, quality_scenes: int, out: Path
+    setting: str, samples: int, python: Path, recipe: Recipe, scenes: int, quality_scenes: int, out: Path
 ) -> Run:
-    shares = (os.cpu_count() or 1) if setting == "chosen" else 1
+    shares = 1 if setting == "shipped" else os.cpu_count() or 1
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         memory = WorkerMemory()
@@ -185,7 +187,7 @@ def run_blenderproc(
             subprocess.Popen(
                 [
                     *(python, Path(__file__).with_name("blenderproc_scenes.py")),
-                    *(out / "scenes", folder, "--setting", setting, "--samples", str(SAMPLES)),
+                    *(out / "scenes", folder, "--setting", setting, "--samples", str(samples)),
                     *("--count", str(scenes), "--share", f"{share}/{shares}"),
                 ],
                 env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
@@ -204,7 +206,7 @@ def run_blenderproc(
         ]
     scenes_of = [scene for result in results for scene in result[1:]]
     return Run(
-        f"BlenderProc, {setting}",
+        f"BlenderProc, {setting}" + (f", {samples} samples" if setting == "api" else ""),
         scenes,
         seconds,
         max(result[0]["ready_at"] for result in results) - started_at,
@@ -257,6 +259,7 @@ def main() -> None:
     parser.add_argument("--size", default="480x270")
     parser.add_argument("--reference-samples", type=int, default=256)
     parser.add_argument("--settings", nargs="+", default=SETTINGS, choices=SETTINGS)
+    parser.add_argument("--api-samples", type=int, nargs="+", default=(SAMPLES, 2 * SAMPLES))
     parser.add_argument("--prepare-only", action="store_true")
     parser.add_argument("--out", type=Path, help="where scenes and references stay; else a temporary folder")
     arguments = parser.parse_args()
@@ -268,13 +271,19 @@ def main() -> None:
             return
         runs = [run_ours(recipe, arguments.quality_scenes, out)]
         for setting in arguments.settings:
-            scenes = arguments.shipped_scenes if setting == "shipped" else arguments.scenes
-            runs.append(
-                run_blenderproc(
-                    setting, arguments.blenderproc_python, recipe, scenes, arguments.quality_scenes, out
+            for samples in arguments.api_samples if setting == "api" else (SAMPLES,):
+                runs.append(
+                    run_blenderproc(
+                        setting,
+                        samples,
+                        arguments.blenderproc_python,
+                        recipe,
+                        arguments.shipped_scenes if setting == "shipped" else arguments.scenes,
+                        arguments.quality_scenes,
+                        out,
+                    )
                 )
-            )
-            report(runs)
+                report(runs)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Renders the .blend files of `benchmarks.against_blenderproc` with BlenderProc, in BlenderProc's own Python.
 
-    USE_EXTERNAL_BPY_MODULE=1 python blenderproc_scenes.py SCENES OUT --setting shipped|own-denoiser|chosen
+    USE_EXTERNAL_BPY_MODULE=1 python blenderproc_scenes.py SCENES OUT --setting shipped|api|chosen
 
 What its users do in a loop: clean up, load, place the camera, render both eyes with depth, write HDF5. Prints when it
 was ready for the first scene, and the seconds of each step of every scene.
@@ -16,21 +16,11 @@ import blenderproc as bproc
 import bpy
 
 
-def choose_shipped() -> None:
-    """BlenderProc as it comes: up to 1024 samples until the noise is below 0.01, its denoiser."""
-
-
-def choose_own_denoiser(samples: int) -> None:
-    """As it comes, but with as many samples as StereoForge takes."""
+def choose_with_its_api(samples: int) -> None:
+    """As StereoForge's, so far as BlenderProc's own functions go: all but the denoiser's quality and what is kept."""
     bproc.renderer.set_max_amount_of_samples(samples)
     bproc.renderer.set_noise_threshold(0)
-
-
-def choose_well(samples: int) -> None:
-    """The settings StereoForge ships, which includes some that only Blender's own interface offers."""
-    choose_own_denoiser(samples)
     bproc.renderer.set_cpu_threads(1)
-    bproc.renderer.set_denoiser(None)
     bproc.renderer.toggle_light_tree(True)
     bproc.renderer.set_light_bounces(
         diffuse_bounces=2,
@@ -39,6 +29,12 @@ def choose_well(samples: int) -> None:
         max_bounces=4,
         transmission_bounces=4,
     )
+
+
+def choose_with_blender_too(samples: int) -> None:
+    """The settings StereoForge ships, those included that only Blender's own interface offers."""
+    choose_with_its_api(samples)
+    bproc.renderer.set_denoiser(None)
     scene = bpy.context.scene
     scene.render.use_persistent_data = True
     cycles = scene.cycles
@@ -86,17 +82,17 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("scenes", type=Path)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--setting", choices=("shipped", "own-denoiser", "chosen"), required=True)
+    parser.add_argument("--setting", choices=("shipped", "api", "chosen"), required=True)
     parser.add_argument("--samples", type=int, default=4)
     parser.add_argument("--count", type=int, required=True)
     parser.add_argument("--share", default="0/1", help="I/N: scenes I, I + N, ...")
     arguments = parser.parse_args()
     first, step = map(int, arguments.share.split("/"))
     bproc.init()
-    if arguments.setting == "own-denoiser":
-        choose_own_denoiser(arguments.samples)
+    if arguments.setting == "api":
+        choose_with_its_api(arguments.samples)
     elif arguments.setting == "chosen":
-        choose_well(arguments.samples)
+        choose_with_blender_too(arguments.samples)
     cameras = json.loads((arguments.scenes / "cameras.json").read_text())
     set_up(cameras[0])
     print("RESULT", json.dumps({"ready_at": time.time()}), flush=True)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.dataset import StereoDataset, StereoSample, open_layout
+from datagen.disparity_histogram import DisparityHistogram
 from datagen.errors import DatasetError
 from datagen.layout import SPLITS, Layout
 from datagen.manifest import SceneManifest, read_manifest
@@ -95,8 +96,8 @@ def write_gallery(
         "gallery.html",
         title=layout.root.resolve().name,
         lead=_lead(recipe, datasets),
-        tiles=_tiles(layout, statistics, splits),
-        plots=[svg(figure) for figure in histograms(statistics)],
+        tiles=_tiles(layout, statistics, splits, recipe),
+        plots=[svg(figure) for figure in histograms(statistics, recipe.disparities)],
         measured=sum(map(len, statistics.values())),
         keys=_keys(nearest),
         nearest_px=round(nearest),
@@ -207,7 +208,9 @@ def _lead(recipe: Recipe, datasets: dict[str, StereoDataset]) -> str:
     return f"{recipe.family} at {recipe.world.width} × {recipe.world.height}: {counts} stereo pairs."
 
 
-def _tiles(layout: Layout, statistics: dict[str, SetStatistics], splits: list[str]) -> list[dict[str, str]]:
+def _tiles(
+    layout: Layout, statistics: dict[str, SetStatistics], splits: list[str], recipe: Recipe
+) -> list[dict[str, str]]:
     disparity = np.concatenate([one.disparity for one in statistics.values()])
     low, middle, high = np.percentile(disparity, (1, 50, 99))
     joined = {
@@ -222,17 +225,30 @@ def _tiles(layout: Layout, statistics: dict[str, SetStatistics], splits: list[st
         (f"{joined['visible_objects'].mean():.0f}", "objects in view, on average"),
         (f"{joined['textured'].mean():.0%}", "of the pixels textured"),
     )
+    if recipe.disparities:
+        missed = recipe.disparities.missed(disparity)
+        values += (
+            (f"{missed:.1%}", "of the surfaces' pixels outside the histogram of disparities asked for"),
+        )
     return [{"value": value, "label": label} for value, label in values]
 
 
-def histograms(statistics: dict[str, SetStatistics]) -> list[Any]:
-    """Histograms of the disparity over pixels and of the other quantities over frames, a line for each name."""
+def histograms(statistics: dict[str, SetStatistics], wanted: DisparityHistogram | None = None) -> list[Any]:
+    """Histograms of the disparity over pixels and of the other quantities over frames, a line for each name.
+
+    `wanted`, if any, is a line beside those of the disparity: all surfaces together, as much as there is of them.
+    """
     nearest = max(float(np.percentile(one.disparity, 99.9)) for one in statistics.values())
     edges = np.linspace(0, max(nearest, 1.0), 61)
+    lines = {split: _shares(one.disparity, edges) for split, one in statistics.items()}
+    if wanted:
+        disparity = np.concatenate([one.disparity for one in statistics.values()])
+        below = np.interp(edges, wanted.edges_px, np.concatenate([[0], np.cumsum(wanted.shares)]))
+        lines["asked for"] = 100 * float((disparity > 0).mean()) * np.diff(below)
     figures = [
         histogram(
             edges,
-            {split: _shares(one.disparity, edges) for split, one in statistics.items()},
+            lines,
             "disparity, px",
             "pixels, %",
             "How near things are",

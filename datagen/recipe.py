@@ -12,13 +12,14 @@ import numpy as np
 import yaml
 
 from datagen.curation import Curation
-from datagen.disparity_range import with_greatest_disparity
+from datagen.disparity_histogram import DisparityHistogram, fitted, with_depths
+from datagen.disparity_range import REACHED_PERCENT, with_disparity_at
 from datagen.errors import DatasetError
 from datagen.formats.limits import read_bounded
 from datagen.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
 from scenes.assets import AssetPool
-from scenes.serialization import from_plain, to_plain
+from scenes.serialization import OMIT_DEFAULT, from_plain, to_plain
 from storage import write_text
 
 MAX_RECIPE_BYTES = 1 << 20
@@ -47,6 +48,8 @@ class Recipe:
     curriculum_scenes: int = 0
     """Over so many scenes of each split the worlds grow from few and simple to the family's own; 0 for none."""
     curation: Curation = field(default_factory=Curation)
+    disparities: DisparityHistogram | None = field(default=None, metadata=OMIT_DEFAULT)
+    """How the disparities of all scenes together shall be spread; None for whatever the family gives."""
 
     def __post_init__(self) -> None:
         for split, count in self.scenes.items():
@@ -80,6 +83,10 @@ class Recipe:
                 self.world.within_disparities(*self.curation.disparity_px)
         except ValueError as error:
             raise DatasetError(str(error)) from error
+        if self.disparities and self.curation.disparity_px:
+            raise DatasetError("a recipe has a range of disparities or a histogram of them, not both")
+        if self.disparities and not self.disparities.components:
+            object.__setattr__(self, "disparities", fitted(self.disparities, self.world, self.seed))
         if self.seed < 0:
             raise DatasetError(f"the seed must not be negative, got {self.seed}")
 
@@ -101,10 +108,12 @@ class Recipe:
             world = world.at_complexity(index / self.curriculum_scenes)
         wanted = self.curation.disparity_px
         world = world.within_disparities(*wanted) if wanted else world
+        component = self.disparities.component(index) if self.disparities else None
+        world = with_depths(world, component) if component else world
         scene = sample_scene(np.random.default_rng(sequence), self.family, world, self.assets.of_split(split))
         if wanted and not world.depths_for_range:
-            scene = with_greatest_disparity(scene, wanted[1])
-        return scene
+            scene = with_disparity_at(scene, REACHED_PERCENT, wanted[1])
+        return with_disparity_at(scene, 50.0, component.median_px) if component else scene
 
 
 def recipe_from_plain(data: Any, origin: str) -> Recipe:

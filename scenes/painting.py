@@ -148,6 +148,12 @@ def flat_colors(index: NDArray[np.integer[Any]], colors: Palette | NDArray[np.fl
     return np.take(table, index, axis=1)
 
 
+def fraction(value: Field) -> Field:
+    """What `value % 1` is, many times faster."""
+    part: Field = kernels.fraction(value)
+    return part
+
+
 def smooth_step(value: Field, edge: float, width: float) -> Field:
     """0 below `edge`, 1 above, with a ramp of `width`: edges without stairs."""
     stepped: Field = kernels.smooth_stepped(value, np.float32(edge), np.float32(width))

@@ -19,6 +19,11 @@ def blended(below, above, cover):
     return (above - below) * cover + below
 
 
+@vectorize(["f4(f4)", "f8(f8)"], cache=True)
+def fraction(value):
+    return value - np.floor(value)
+
+
 @vectorize(["f4(f4,f4,f4)", "f8(f8,f4,f4)"], cache=True)
 def smooth_stepped(value, edge, width):
     t = (value - edge) / width + _HALF

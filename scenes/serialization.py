@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
 from cattrs import Converter, transform_error
 from cattrs.errors import ClassValidationError
-from cattrs.gen import make_dict_structure_fn
+from cattrs.gen import make_dict_structure_fn, make_dict_unstructure_fn, override
 from cattrs.strategies import configure_tagged_union
 from cattrs.v import format_exception
 
@@ -26,6 +26,9 @@ from scenes.registry import FAMILIES
 from scenes.spec import Deformation, Light, Scene, Shape, Texture
 
 T = TypeVar("T")
+
+OMIT_DEFAULT = {"omit_default": True}
+"""Metadata of a field that is written only where it is not its default, so that records without it read as ever."""
 
 
 def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str = "kind") -> None:
@@ -52,6 +55,14 @@ def _make_converter() -> Converter:
     converter.register_structure_hook_factory(
         is_dataclass,
         lambda cls: make_dict_structure_fn(cls, converter, _cattrs_forbid_extra_keys=True),
+    )
+    converter.register_unstructure_hook_factory(
+        lambda cls: is_dataclass(cls) and any(field.metadata == OMIT_DEFAULT for field in fields(cls)),
+        lambda cls: make_dict_unstructure_fn(
+            cls,
+            converter,
+            **{f.name: override(omit_if_default=True) for f in fields(cls) if f.metadata == OMIT_DEFAULT},
+        ),
     )
     _tagged(converter, Shape, scenes.shapes.SHAPES | USER_SHAPES)
     _tagged(converter, Texture, scenes.textures.TEXTURES | USER_TEXTURES)

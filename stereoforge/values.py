@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import tyro
 
+from datagen.disparity_histogram import DisparityHistogram
 from stereoforge.errors import UsageError
 
 
@@ -41,6 +43,26 @@ def parse_range(text: str, flag: str = "disparity-range") -> tuple[float, float]
     if not match or float(match[1]) >= float(match[2]):
         raise UsageError(f"--{flag} takes LOW,HIGH in pixels with LOW < HIGH, such as 5,120, not {text!r}")
     return float(match[1]), float(match[2])
+
+
+def parse_histogram(text: str, flag: str = "disparity-histogram") -> DisparityHistogram:
+    """The histogram of "2-20:30,20-60:50,60-120:20": ranges in pixels that follow one another, and their weights."""
+    bins = [
+        re.fullmatch(r"(\d{1,5}(?:\.\d+)?)-(\d{1,5}(?:\.\d+)?):(\d{1,9}(?:\.\d+)?)", part.strip())
+        for part in text.split(",")
+    ]
+    found = [tuple(map(float, match.groups())) for match in bins if match]
+    follows = all(one[1] == two[0] for one, two in pairwise(found)) and all(
+        low < high for low, high, _ in found
+    )
+    total = sum(weight for _, _, weight in found)
+    if len(found) < len(bins) or not follows or not total:
+        raise UsageError(
+            f"--{flag} takes LOW-HIGH:WEIGHT, comma-separated, each LOW the HIGH before it, such as "
+            f"2-20:30,20-60:50,60-120:20, not {text!r}"
+        )
+    edges = (found[0][0], *(high for _, high, _ in found))
+    return DisparityHistogram(edges, tuple(weight / total for _, _, weight in found))
 
 
 def parse_shard(text: str) -> tuple[int, int]:

@@ -15,6 +15,7 @@ from scenes.painting import (
     Srgb,
     colorize,
     finish,
+    fraction,
     mix,
     paint,
     sample_palette,
@@ -41,7 +42,7 @@ def nearest_seeds(
     px = np.pad(points[0], 1, mode="wrap") + step[None, :]
     py = np.pad(points[1], 1, mode="wrap") + step[:, None]
     px, py = px.astype(np.float32).ravel(), py.astype(np.float32).ravel()
-    x, y = x % 1 * np.float32(cells), y % 1 * np.float32(cells)
+    x, y = fraction(x) * np.float32(cells), fraction(y) * np.float32(cells)
     nearest, first, second = nearest_of_grid(x, y, px, py, cells)
     inner_row, inner_column = np.divmod(nearest, cells + 2)
     cell = (inner_row - 1) % cells * cells + (inner_column - 1) % cells

@@ -17,6 +17,7 @@ from scenes.painting import (
     colorize,
     finish,
     flat_colors,
+    fraction,
     mix,
     paint,
     sample_palette,
@@ -259,20 +260,22 @@ class Facade(Texture):
         x, y = unit_grid(self.size)
         u, v = x * self.bays, y * self.floors
         bay, floor = u.astype(np.int32) % self.bays, v.astype(np.int32) % self.floors
-        across = np.abs(u % 1 - np.float32(0.5)) / np.float32(self.window[0] / 2)
-        up = np.abs(v % 1 - np.float32(0.5)) / np.float32(self.window[1] / 2)
+        across = np.abs(fraction(u) - np.float32(0.5)) / np.float32(self.window[0] / 2)
+        up = np.abs(fraction(v) - np.float32(0.5)) / np.float32(self.window[1] / 2)
         edge = np.maximum(across, up)
         opening = (edge < 1).astype(np.float32)
         pane = ((edge < 0.85) & (np.minimum(across, up) > 0.06)).astype(np.float32)
         stains = np.clip(1 + np.float32(0.16) * spectral_noise(rng, self.size, 1.1, 1), 0.3, 1.7)
         lit = rng.uniform(0.0, 1.0, (self.floors, self.bays)).astype(np.float32)[floor, bay]
-        glass = colorize(lit + np.float32(0.3) * (v % 1 - np.float32(0.5)), self.palette[2:])
+        glass = colorize(lit + np.float32(0.3) * (fraction(v) - np.float32(0.5)), self.palette[2:])
         reflections = np.float32(0.6) + np.float32(0.8) * to_unit(spectral_noise(rng, self.size, 1.4, 3))
         # A darker line under each window: the sill's shadow.
-        sill = smooth_step(v % 1, 0.5 + self.window[1] / 2, 0.01) * (v % 1 < 0.56 + self.window[1] / 2)
+        sill = smooth_step(fraction(v), 0.5 + self.window[1] / 2, 0.01) * (
+            fraction(v) < 0.56 + self.window[1] / 2
+        )
         wall = paint(self.palette[0]) * (stains * (1 - np.float32(0.4) * sill * (across < 1.1)))
         picture = mix(wall, paint(self.palette[1]) * stains, opening)
         picture = mix(picture, glass * reflections, pane)
         if chance(rng, 0.5):
-            picture *= 1 - np.float32(0.4) * (v % 1 > 0.965)
+            picture *= 1 - np.float32(0.4) * (fraction(v) > 0.965)
         return finish(picture, rng, self.grain)

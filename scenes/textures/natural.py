@@ -14,6 +14,7 @@ from scenes.painting import (
     Srgb,
     colorize,
     finish,
+    fraction,
     mix,
     paint,
     sample_palette,
@@ -288,8 +289,8 @@ class LeafVeins(Texture):
         blotch = spectral_noise(rng, self.size, 1.0, 3)
         bend = np.float32(0.35) * spectral_noise(rng, self.size, 1.8, 1)
         # Side veins at an angle to a midrib, four leaves a picture.
-        rows = np.abs((4 * x) % 1 - np.float32(0.5))
-        side = np.abs(((12 * y + 8 * rows + bend) % 1) - np.float32(0.5))
+        rows = np.abs(fraction(4 * x) - np.float32(0.5))
+        side = np.abs(fraction(12 * y + 8 * rows + bend) - np.float32(0.5))
         net = np.maximum(1 - smooth_step(side, 0.08, 0.12), 1 - smooth_step(rows, 0.04, 0.05))
         fine = 1 - smooth_step(np.abs(spectral_noise(rng, self.size, 0.6, 16, 60)), 0.1, 0.2)
         picture = colorize(to_unit(blotch), self.palette)

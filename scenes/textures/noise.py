@@ -14,6 +14,7 @@ from scenes.painting import (
     Srgb,
     colorize,
     finish,
+    fraction,
     mix,
     paint,
     sample_palette,
@@ -212,9 +213,9 @@ class WoodPlanks(Texture):
         bend = spectral_noise(rng, self.size, 1.8, 1, stretch=(1.0, 4.0))[rows, columns]
         pores = spectral_noise(rng, self.size, 0.4, 8, stretch=(1.0, 16.0))[rows, columns]
         ring = (across - board) * np.float32(self.rings) + np.float32(0.9) * bend
-        value = (ring % 1) ** 2 + np.float32(0.12) * pores
+        value = fraction(ring) ** 2 + np.float32(0.12) * pores
         tone = 1 + np.float32(0.15) * rng.standard_normal(self.planks).astype(np.float32)[board]
-        edge = np.minimum(across % 1, 1 - across % 1)
+        edge = np.minimum(fraction(across), 1 - fraction(across))
         joint = 1 - np.float32(0.6) * (1 - smooth_step(edge, 0.012 * self.planks, 0.012 * self.planks))
         picture = colorize(value, self.palette) * (tone * joint)
         return finish(picture, rng, self.grain)

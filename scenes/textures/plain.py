@@ -14,6 +14,7 @@ from scenes.painting import (
     Srgb,
     colorize,
     finish,
+    fraction,
     paint,
     sample_palette,
     spectral_noise,
@@ -101,7 +102,7 @@ class Gradient(Texture):
         x, y = unit_grid(self.size)
         phase = self.cycles[0] * x + self.cycles[1] * y
         phase = phase + np.float32(self.waviness) * spectral_noise(rng, self.size, 2.0)
-        ramp = np.abs(2 * (phase % 1) - 1)
+        ramp = np.abs(2 * (fraction(phase)) - 1)
         detail = to_unit(spectral_noise(rng, self.size, 0.8, 4)) - np.float32(0.5)
         picture = colorize(ramp, self.palette) * (1 + np.float32(0.25) * detail)
         return finish(picture, rng, self.grain)

@@ -19,6 +19,7 @@ from scenes.painting import (
     Srgb,
     colorize,
     finish,
+    fraction,
     mix,
     oklch_to_srgb,
     paint,
@@ -128,8 +129,8 @@ class Paving(Texture):
         u = x * self.columns + np.float32(self.bond) * (row % 2)
         column = np.floor(u).astype(np.int32) % self.columns
         tone = rng.uniform(0.0, 1.0, (self.rows, self.columns)).astype(np.float32)[row, column]
-        across = np.minimum(u % 1, 1 - u % 1) * np.float32(self.rows / self.columns)
-        edge = np.minimum(across, np.minimum(v % 1, 1 - v % 1))
+        across = np.minimum(fraction(u), 1 - fraction(u)) * np.float32(self.rows / self.columns)
+        edge = np.minimum(across, np.minimum(fraction(v), 1 - fraction(v)))
         joint = np.float32(0.55) + np.float32(0.45) * smooth_step(edge, self.joint / 2, self.joint * 0.6)
         stains = 1 + np.float32(self.wear) * spectral_noise(rng, self.size, 1.1, 1)
         return finish(colorize(tone, self.palette) * (joint * np.clip(stains, 0.4, 1.5)), rng, 0.07)
@@ -219,8 +220,8 @@ class WindowPanes(Texture):
         u, v = x * cells, (1 - y) * cells
         column, row = (grid.astype(np.int32) % cells for grid in (u, v))
         # 0..1 within the opening, upwards.
-        a = (u % 1 - np.float32(0.5)) / np.float32(self.opening[0]) + np.float32(0.5)
-        b = (v % 1 - np.float32(self.sill)) / np.float32(self.opening[1])
+        a = (fraction(u) - np.float32(0.5)) / np.float32(self.opening[0]) + np.float32(0.5)
+        b = (fraction(v) - np.float32(self.sill)) / np.float32(self.opening[1])
         room = rng.uniform(0.0, 1.0, (5, cells, cells)).astype(np.float32)[:, row, column]
         depth = (
             np.float32(0.6) + np.float32(0.6) * b + np.float32(0.25) * spectral_noise(rng, self.size, 1.3, 3)
@@ -285,14 +286,16 @@ class RoofTiles(Texture):
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
         x, y = unit_grid(self.size)
-        across = np.abs((x * self.columns) % 1 - np.float32(0.5))
+        across = np.abs(fraction(x * self.columns) - np.float32(0.5))
         v = y * self.rows + np.float32(self.rounded) * (2 * across) ** 2
         row = np.floor(v).astype(np.int32) % self.rows
         u = x * self.columns + np.float32(0.5) * (row % 2)
         column = np.floor(u).astype(np.int32) % self.columns
         tone = rng.uniform(0.0, 1.0, (self.rows, self.columns)).astype(np.float32)[row, column]
-        shadow = np.float32(0.5) + np.float32(0.5) * smooth_step(v % 1, 0.1, 0.2)
-        gap = np.float32(0.7) + np.float32(0.3) * smooth_step(np.minimum(u % 1, 1 - u % 1), 0.05, 0.06)
+        shadow = np.float32(0.5) + np.float32(0.5) * smooth_step(fraction(v), 0.1, 0.2)
+        gap = np.float32(0.7) + np.float32(0.3) * smooth_step(
+            np.minimum(fraction(u), 1 - fraction(u)), 0.05, 0.06
+        )
         moss = 1 + np.float32(0.12) * spectral_noise(rng, self.size, 1.2, 1)
         return finish(colorize(tone, self.palette) * (shadow * gap * moss), rng, 0.07)
 
@@ -501,7 +504,7 @@ class RoadSign(Texture):
         # Two or three numerals of seven segments each.
         count = int(rng.integers(2, 4))
         place = (u + np.float32(0.6)) * np.float32(count / 1.2)
-        a, b = place % 1 - np.float32(0.5), v / np.float32(0.42)
+        a, b = fraction(place) - np.float32(0.5), v / np.float32(0.42)
         on = rng.random((count, 7)) < 0.7
         digit = on[np.clip(place.astype(np.int32), 0, count - 1)]
         bars = [np.abs(b - level) < 0.14 for level in (-1.0, 0.0, 1.0)]
@@ -546,10 +549,10 @@ class WheelFace(Texture):
         rng = np.random.default_rng(self.seed)
         x, y = unit_grid(self.size)
         # Coordinates start in the wheel's middle: the picture is wrapped around it.
-        u, v = (x + np.float32(0.5)) % 1 * 2 - 1, (y + np.float32(0.5)) % 1 * 2 - 1
+        u, v = fraction(x + np.float32(0.5)) * 2 - 1, fraction(y + np.float32(0.5)) * 2 - 1
         radius = np.hypot(u, v) / np.float32(self.rim)
         angle = np.arctan2(v, u) * np.float32(self.spokes / (2 * np.pi))
-        spoke = np.abs(angle % 1 - np.float32(0.5)) < np.float32(self.fill / 2)
+        spoke = np.abs(fraction(angle) - np.float32(0.5)) < np.float32(self.fill / 2)
         metal = ((radius < 0.95) & (spoke | (radius < 0.3) | (radius > 0.82))).astype(np.float32)
         tyre = np.float32(34) * (1 - np.float32(0.3) * ((radius > 1.2) & (radius < 1.3)))
         picture = mix(np.broadcast_to(tyre, (3, *u.shape)), paint(self.metal), metal)

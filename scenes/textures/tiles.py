@@ -16,6 +16,7 @@ from scenes.painting import (
     colorize,
     finish,
     flat_colors,
+    fraction,
     mix,
     paint,
     sample_palette,
@@ -76,8 +77,8 @@ class Bricks(Texture):
         column = np.floor(u).astype(np.int32) % self.columns
         tone = rng.uniform(0.0, 1.0, (self.rows, self.columns)).astype(np.float32)[row, column]
         tone = tone + np.float32(0.1) * spectral_noise(rng, self.size, 0.8, 4)
-        across = np.minimum(u % 1, 1 - u % 1) * np.float32(self.rows / self.columns)
-        edge = np.minimum(across, np.minimum(v % 1, 1 - v % 1))
+        across = np.minimum(fraction(u), 1 - fraction(u)) * np.float32(self.rows / self.columns)
+        edge = np.minimum(across, np.minimum(fraction(v), 1 - fraction(v)))
         face = smooth_step(edge, self.joint / 2, self.joint * 0.5)
         picture = mix(paint(self.mortar), colorize(tone, self.palette), face)
         return finish(picture * _wear(rng, self.size, 0.12), rng, self.grain)
@@ -153,7 +154,7 @@ class Stripes(Texture):
         rng = np.random.default_rng(self.seed)
         x, y = unit_grid(self.size)
         bend = np.float32(self.waviness) * spectral_noise(rng, self.size, 2.0, 1)
-        phase = (self.cycles[0] * x + self.cycles[1] * y + bend) % 1
+        phase = fraction(self.cycles[0] * x + self.cycles[1] * y + bend)
         ends = np.cumsum(self.widths) / np.sum(self.widths)
         stripe = np.searchsorted(ends[:-1].astype(np.float32), phase.ravel(), side="right").reshape(
             phase.shape
@@ -242,7 +243,7 @@ class Dots(Texture):
         row = np.floor(v).astype(np.int32)
         u = x * self.columns + (np.float32(0.5) * (row % 2) if self.staggered else np.float32(0))
         column = np.floor(u).astype(np.int32) % self.columns
-        reach = np.hypot(u % 1 - np.float32(0.5), v % 1 - np.float32(0.5))
+        reach = np.hypot(fraction(u) - np.float32(0.5), fraction(v) - np.float32(0.5))
         soft = 1.5 * self.columns / self.size
         cover = 1 - smooth_step(reach, self.radius, soft)
         if self.ring > 0:
@@ -283,8 +284,8 @@ class Weave(Texture):
         x, y = unit_grid(self.size)
         u, v = x * self.strands, y * self.strands
         weft_on_top = (np.floor(u) + np.floor(v)).astype(np.int32) % 2 == 0
-        along = np.where(weft_on_top, u % 1, v % 1) - np.float32(0.5)
-        across = np.abs(np.where(weft_on_top, v % 1, u % 1) - np.float32(0.5))
+        along = np.where(weft_on_top, fraction(u), fraction(v)) - np.float32(0.5)
+        across = np.abs(np.where(weft_on_top, fraction(v), fraction(u)) - np.float32(0.5))
         height = np.cos(np.pi * along) * (1 - (2 * across) ** 2 * np.float32(0.6))
         band = 1 - smooth_step(across, 0.5 - self.gap / 2, 0.12)
         tones = to_unit(spectral_noise(rng, self.size, 0.8, 2))

@@ -24,7 +24,7 @@ from datagen.render import SCENE_TIMEOUT_S, local_executor, ray_executor
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console, progress_bar
-from stereoforge.values import parse_range, parse_shard, parse_size, shown, shown_duration
+from stereoforge.values import parse_histogram, parse_range, parse_shard, parse_size, shown, shown_duration
 from storage import open_tree, temporary_folder
 
 DEFAULT_FAMILY = "flying_things"
@@ -87,6 +87,9 @@ class Render:
     disparity_range: Annotated[str | None, shown("LOW,HIGH", "the family's")] = None
     """Least and greatest disparity of surfaces in pixels, met by choosing depths (flying_things) or the baseline
     (the others, which reach to the horizon: LOW is 0); scenes outside are drawn anew."""
+    disparity_histogram: Annotated[str | None, shown("LOW-HIGH:WEIGHT,...", "the family's")] = None
+    """How many pixels of surfaces shall have which disparity over all scenes together, such as
+    2-20:30,20-60:50,60-120:20: ranges in pixels and their weights, met by choosing depths and baseline."""
     dry_run: bool = False
     """Say what would be rendered, how long it would take and how much disk, measured on one frame of one
     scene; nothing is written."""
@@ -207,6 +210,8 @@ class Render:
         if self.disparity_range is not None:
             limits = parse_range(self.disparity_range)
             changes["curation"] = replace(base.curation, disparity_px=limits)
+        if self.disparity_histogram is not None:
+            changes["disparities"] = parse_histogram(self.disparity_histogram)
         changes |= {key: getattr(self, key) for key in ("seed", "samples") if getattr(self, key) is not None}
         try:
             return replace(base, **changes)

@@ -82,6 +82,9 @@ def test_wrong_flags_exit_with_2(tmp_path: Path, refused: Callable[..., str]) ->
     assert "at least 1" in refused(2, "render", "--out", tmp_path / "set", "--samples", "0")
     assert "no --family swimming" in refused(2, "render", "--out", tmp_path / "set", "--family", "swimming")
     assert "I/N" in refused(2, "render", "--out", tmp_path / "set", "--shard", "4/4")
+    for histogram in ("many", "2-20:1,30-60:1", "20-2:1", "2-20:0"):
+        asked = ("--disparity-histogram", histogram)
+        assert "disparity" in refused(2, "render", "--out", tmp_path / "set", *asked)
     assert not (tmp_path / "set").exists()
 
 
