@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +73,7 @@ class DisparityHistogram:
         bounds = np.cumsum([component.share for component in self.components])
         return self.components[min(int(np.searchsorted(bounds, turn * bounds[-1])), len(bounds) - 1)]
 
-    def missed(self, disparity: NDArray[np.floating]) -> float:
+    def missed(self, disparity: NDArray[np.floating[Any]]) -> float:
         """Share of the surfaces' pixels (above 0) that would have to change bins to meet it."""
         surfaces = disparity[disparity > 0]
         found = np.histogram(surfaces, self.edges_px)[0] / max(len(surfaces), 1)

@@ -217,7 +217,7 @@ def _tiles(
         name: np.concatenate([getattr(one, name) for one in statistics.values()])
         for name in ("occluded", "out_of_frame", "visible_objects", "textured")
     }
-    values = (
+    values: tuple[tuple[str, str], ...] = (
         (f"{sum(len(layout.committed_scenes(split)) for split in splits)}", "finished scenes"),
         (f"{middle:.1f} px", f"median disparity; 98 % between {low:.1f} and {high:.1f} px"),
         (f"{joined['occluded'].mean():.1%}", "of the pixels hidden from the other eye"),

@@ -148,7 +148,7 @@ def flat_colors(index: NDArray[np.integer[Any]], colors: Palette | NDArray[np.fl
     return np.take(table, index, axis=1)
 
 
-def fraction(value: Field) -> Field:
+def fraction(value: NDArray[Any]) -> Field:
     """What `value % 1` is, many times faster."""
     part: Field = kernels.fraction(value)
     return part

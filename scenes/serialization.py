@@ -7,7 +7,7 @@ are registered subclasses, so a scene file can build data but never run code.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
@@ -50,6 +50,14 @@ def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str
     )
 
 
+def _without_defaults(converter: Converter, cls: Any) -> Callable[[Any], dict[str, Any]]:
+    """How to write a record that has fields marked `OMIT_DEFAULT`."""
+    omitted: dict[str, Any] = {
+        field.name: override(omit_if_default=True) for field in fields(cls) if field.metadata == OMIT_DEFAULT
+    }
+    return make_dict_unstructure_fn(cls, converter, **omitted)
+
+
 def _make_converter() -> Converter:
     converter = Converter(forbid_extra_keys=True)
     converter.register_structure_hook_factory(
@@ -58,11 +66,7 @@ def _make_converter() -> Converter:
     )
     converter.register_unstructure_hook_factory(
         lambda cls: is_dataclass(cls) and any(field.metadata == OMIT_DEFAULT for field in fields(cls)),
-        lambda cls: make_dict_unstructure_fn(
-            cls,
-            converter,
-            **{f.name: override(omit_if_default=True) for f in fields(cls) if f.metadata == OMIT_DEFAULT},
-        ),
+        lambda cls: _without_defaults(converter, cls),
     )
     _tagged(converter, Shape, scenes.shapes.SHAPES | USER_SHAPES)
     _tagged(converter, Texture, scenes.textures.TEXTURES | USER_TEXTURES)
