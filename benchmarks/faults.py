@@ -4,9 +4,11 @@
     python -m benchmarks.faults restarts   [--scenes 300] [--kills 20]
     python -m benchmarks.faults disk       [--scenes 12]            (as root: it mounts a small file system)
     python -m benchmarks.faults corrupt    [--trials 1000]
+    python -m benchmarks.faults vouched    [--scenes 2] [--trials 1000]
     python -m benchmarks.faults flips      [--scenes 7] [--flips 200]
     python -m benchmarks.faults memory     [--scenes 500]
     python -m benchmarks.faults throughput [--scenes 60]
+    python -m benchmarks.faults nodes      [--scenes 60]
 
 From the root of a checkout. Scenes are the smallest there are: 64 x 32 pixels, one sample, two or three objects.
 """
@@ -14,6 +16,7 @@ From the root of a checkout. Scenes are the smallest there are: 64 x 32 pixels, 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import random
@@ -28,19 +31,28 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import astuple, replace
+from functools import partial
 from multiprocessing.connection import wait
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.corruption import READERS, damage, make_examples
-from datagen import Recipe, render_dataset
+from datagen import Recipe, StereoDataset, render_dataset
+from datagen.dataset import StereoSample
 from datagen.errors import DatasetError, DiskFullError
 from datagen.executors import LocalExecutor, RayExecutor, WorkerPolicy
+from datagen.export import EXPORTERS, ExportOptions
+from datagen.frame import StereoFrame
+from datagen.layout import EYES
 from datagen.recipe import write_recipe
+from datagen.shards import shard_index
+from datagen.source import open_source
+from datagen.sources import webdataset
 from datagen.verify import verify_dataset
-from scenes import FAMILIES
+from scenes import FAMILIES, scene_to_json
+from storage import open_tree
 from tests.datagen.sabotage import Sabotage, hashes, without
 from training.errors import TrainingError
 from workers import Limits, WorkerError, WorkerProcess
@@ -239,6 +251,65 @@ def outcome_of(worker: WorkerProcess, read: Callable[[Path], object], path: Path
     return "read"
 
 
+def vouched(arguments: argparse.Namespace, folder: Path) -> None:
+    """Damaged files of a data set, and damaged shards of it, through all that reads them by a manifest: what comes
+    out must be what came out before, or a refusal."""
+    root, shards = folder / "set", folder / "shards"
+    render_dataset(tiny(arguments.scenes), root, executor=local())
+    export(root, "webdataset", shards)
+    uses: dict[str, tuple[Path, Callable[[], object]]] = {
+        "StereoDataset": (root, lambda: [digest_of(sample) for sample in StereoDataset(root, "train")]),
+        **{f"export {kind}": (root, partial(export, root, kind, folder / "out")) for kind in EXPORTERS},
+        "shards": (shards, lambda: [frame_digest(f) for f in open_source(str(shards)).frames("train")]),
+    }
+    files = {
+        place: sorted(path for path in place.rglob("*") if path.is_file() and path.parent != root / "logs")
+        for place in (root, shards)
+    }
+    files[root].remove(root / "recipe.yaml")  # How many scenes it promises no manifest knows.
+    for name, (place, use) in uses.items():
+        rng, ends = np.random.default_rng(2), Counter[str]()
+        expected = use()
+        for _ in range(arguments.trials):
+            path = files[place][int(rng.integers(len(files[place])))]
+            good = path.read_bytes()
+            path.write_bytes(damage(good, rng))
+            clear_caches()
+            try:
+                ends["the same as before" if use() == expected else "DAMAGE ACCEPTED"] += 1
+            except DatasetError:
+                ends["refused"] += 1
+            path.write_bytes(good)
+        clear_caches()
+        print(f"  {name:20} {dict(sorted(ends.items()))}", flush=True)
+        check(f"{name}: no damage is accepted", not ends["DAMAGE ACCEPTED"])
+
+
+def clear_caches() -> None:
+    for remembered in (shard_index, webdataset._digests):
+        remembered.cache_clear()
+
+
+def export(root: Path, kind: str, out: Path) -> dict[str, str]:
+    """Export a data set and tell what was written."""
+    if out.exists():
+        shutil.rmtree(out)
+    EXPORTERS[kind]([StereoDataset(root, "train")], open_tree(out), ExportOptions(), lambda *_: None)
+    return hashes(out)
+
+
+def digest_of(sample: StereoSample) -> str:
+    """Of every array, and of the scene."""
+    arrays = [array for eye in EYES for array in astuple(sample.view(eye))]
+    text = scene_to_json(sample.scene_record)
+    return hashlib.sha256(b"".join(map(np.ndarray.tobytes, arrays)) + text.encode()).hexdigest()
+
+
+def frame_digest(frame: StereoFrame) -> str:
+    names = ("left", "right", "disparity_left", "disparity_right", "occlusion_left", "object_index_left")
+    return hashlib.sha256(b"".join(getattr(frame, name).tobytes() for name in names)).hexdigest()
+
+
 def flips(arguments: argparse.Namespace, folder: Path) -> None:
     """Single flipped bits anywhere in a data set, one at a time, each to be found by verify."""
     root = folder / "set"
@@ -317,10 +388,55 @@ def throughput(arguments: argparse.Namespace, folder: Path) -> None:
     check(f"ray / local = {rates['ray'] / rates['local']:.2f} >= 0.9", rates["ray"] >= 0.9 * rates["local"])
 
 
+def nodes(arguments: argparse.Namespace, folder: Path) -> None:
+    """A Ray cluster of two machines, both of them this one, of which one is killed when a third is done."""
+    import ray
+    from ray.cluster_utils import Cluster
+
+    recipe, third = tiny(arguments.scenes), arguments.scenes // 3
+    render_dataset(recipe, folder / "undisturbed", executor=local())
+    os.environ["PYTHONPATH"] = str(
+        Path.cwd()
+    )  # Ray's workers import what they run from where this process does.
+    here = {"num_cpus": 1, "include_dashboard": False, "node_ip_address": "127.0.0.2"}
+    cluster = Cluster(initialize_head=True, head_node_args=here)
+    times: list[float] = []
+    try:
+        second = cluster.add_node(num_cpus=1, node_ip_address="127.0.0.3")
+        cluster.wait_for_nodes()
+        ray.init(cluster.address, _node_ip_address="127.0.0.2", log_to_driver=False, logging_level="ERROR")
+
+        def on_scene(done: int, _: int, __: object) -> None:
+            times.append(time.monotonic())
+            if done == third:
+                cluster.remove_node(second, allow_graceful=False)
+
+        executor = RayExecutor(policy=WorkerPolicy(LIMITS))
+        summary = render_dataset(recipe, folder / "set", executor=executor, on_scene=on_scene)
+    finally:
+        ray.shutdown()
+        cluster.shutdown()
+    before = (third - 1) / (times[third - 1] - times[0])
+    after = (arguments.scenes - third) / (times[-1] - times[third - 1])
+    print(f"  scenes a second: {before:.2f} before the loss, {after:.2f} after it")
+    check("all scenes committed", (summary.rendered, summary.failures) == (arguments.scenes, ()))
+    check("the same SHA-256 as undisturbed", hashes(folder / "set") == hashes(folder / "undisturbed"))
+
+
 EXPERIMENTS = {
-    function.__name__: function for function in (kills, restarts, disk, corrupt, flips, memory, throughput)
+    function.__name__: function
+    for function in (kills, restarts, disk, corrupt, vouched, flips, memory, throughput, nodes)
 }
-SCENES = {"kills": 300, "restarts": 300, "disk": 12, "flips": 7, "memory": 500, "throughput": 60}
+SCENES = {
+    "kills": 300,
+    "restarts": 300,
+    "disk": 12,
+    "vouched": 2,
+    "flips": 7,
+    "memory": 500,
+    "throughput": 60,
+    "nodes": 60,
+}
 
 
 def main() -> None:

@@ -23,8 +23,9 @@ from datagen.formats import (
 )
 from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.png import read_png_size
+from datagen.integrity import compare
 from datagen.layout import EYES, RENDER_PASSES, SPLITS, Direction, Eye, Layout
-from datagen.manifest import read_manifest
+from datagen.manifest import FileEntry, read_manifest
 from datagen.mirror import open_mirror
 from scenes import Scene, scene_from_json
 from scenes.assets import use_store
@@ -47,8 +48,8 @@ class EyeView:
 class StereoSample:
     """One frame of a scene. Every array is read at its first use and kept as long as the sample is.
 
-    Reading raises DatasetError, naming the file, for one that is missing, damaged, or not of the size of
-    the left image.
+    Reading raises DatasetError, naming the file, for one that is missing, not the one that the scene's manifest
+    describes by its SHA-256, or not of the size of the left image.
     """
 
     layout: Layout
@@ -167,7 +168,22 @@ class StereoSample:
     @cached_property
     def scene_record(self) -> Scene:
         """The world that was rendered, with its camera."""
-        return read_scene(self.layout.local(self.layout.scene_record(self.split, self.scene)))
+        return read_scene(self.intact(self.layout.scene_record(self.split, self.scene)))
+
+    def intact(self, path: Path) -> Path:
+        """A path of one of the scene's files, compared with its manifest. Raises DatasetError."""
+        entry = self._entries.get(self.layout.relative(path))
+        if entry is None:
+            raise DatasetError(f"{path}: is not in the scene's manifest")
+        _, problem = compare(self.layout, entry)
+        if problem:
+            raise DatasetError(f"{path}: {problem}; verify --repair renders it again")
+        return path
+
+    @cached_property
+    def _entries(self) -> dict[str, FileEntry]:
+        manifest = read_manifest(self.layout.local(self.layout.manifest(self.split, self.scene)))
+        return {entry.path: entry for entry in manifest.files}
 
     @cached_property
     def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -182,8 +198,7 @@ class StereoSample:
         return RENDER_PASSES[self.render_pass]
 
     def _file(self, kind: str, eye: Eye, direction: Direction | None = None) -> Path:
-        path = self.layout.file(kind, self.split, self.scene, eye, self.frame, direction)
-        return self.layout.local(path)
+        return self.intact(self.layout.file(kind, self.split, self.scene, eye, self.frame, direction))
 
     def _image(self, eye: Eye) -> NDArray[np.uint8]:
         path = self._file(self._image_kind, eye)

@@ -5,12 +5,9 @@ from __future__ import annotations
 import errno
 import hashlib
 import io
-from collections.abc import Iterable, Iterator
 
-from datagen.dataset import StereoSample
-from datagen.errors import DatasetError
 from datagen.layout import Layout
-from datagen.manifest import FileEntry, read_manifest
+from datagen.manifest import FileEntry
 
 
 def compare(layout: Layout, entry: FileEntry) -> tuple[int, str | None]:
@@ -34,23 +31,3 @@ def compare_open(file: io.BufferedIOBase, entry: FileEntry) -> tuple[int, str | 
     if digest != entry.sha256:
         return size, "is damaged, its SHA-256 is not the manifest's"
     return size, None
-
-
-def intact(samples: Iterable[StereoSample]) -> Iterator[StereoSample]:
-    """The same samples, each scene's files compared with its manifest before its first one.
-
-    For whoever copies a data set: damage that travels into a copy can no longer be told from data. Raises
-    DatasetError, naming the first damaged file.
-    """
-    last = None
-    for sample in samples:
-        layout, scene = sample.layout, (sample.split, sample.scene)
-        if scene != last:
-            for entry in read_manifest(layout.local(layout.manifest(*scene))).files:
-                _, problem = compare(layout, entry)
-                if problem:
-                    raise DatasetError(
-                        f"{layout.root / entry.path}: {problem}; verify --repair renders it again"
-                    )
-            last = scene
-        yield sample

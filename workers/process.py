@@ -120,13 +120,18 @@ class WorkerProcess:
             self.stop
         )  # At exit multiprocessing waits for its children, and ours waits for calls.
         self._deadline = 0.0
-        self._begun = False
+        self._began_at: float | None = None
         self._end: _Returned | _Raised | None = None
 
     @property
     def begun(self) -> bool:
         """Whether the process has come up, imported what the last call needs and begun it."""
-        return self._begun
+        return self._began_at is not None
+
+    @property
+    def ran_s(self) -> float:
+        """Seconds since the last call was begun; 0 if it has not been."""
+        return 0.0 if self._began_at is None else time.monotonic() - self._began_at
 
     @property
     def alive(self) -> bool:
@@ -144,7 +149,7 @@ class WorkerProcess:
 
     def start(self, function: Callable[..., Any], *args: Any) -> None:
         """Begin a call. Raises what pickling the function or its arguments raises."""
-        self._end, self._begun = None, False
+        self._end = self._began_at = None
         self._output.truncate(0)
         self._deadline = time.monotonic() + START_TIMEOUT_S + self.limits.timeout_s
         try:
@@ -201,8 +206,8 @@ class WorkerProcess:
             self._end = self._death()
             return
         if message == _BEGUN:
-            self._begun = True
-            self._deadline = time.monotonic() + self.limits.timeout_s
+            self._began_at = time.monotonic()
+            self._deadline = self._began_at + self.limits.timeout_s
         else:
             self._end = message
             self._check_memory_error()

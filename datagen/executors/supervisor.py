@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -48,6 +48,7 @@ class Supervisor:
         self._jobs_done = 0
         self._call: tuple[Callable[[Any], Any], Any] | None = None
         self._tries = self._faults = self._kills = self._starts_killed = 0
+        self._ran_s = 0.0
 
     @property
     def busy(self) -> bool:
@@ -60,6 +61,7 @@ class Supervisor:
     def start(self, function: Callable[[Any], Any], job: Any) -> None:
         self._call = (function, job)
         self._tries = self._faults = self._kills = self._starts_killed = 0
+        self._ran_s = 0.0
         self._try()
 
     def poll(self) -> Outcome[Any, Any] | None:
@@ -77,7 +79,10 @@ class Supervisor:
             kind: Any = "disk_full" if getattr(error, "errno", None) in _NO_SPACE else "exception"
             sentence = f"{type(error).__name__}: {' '.join(str(error).split())}"
             failure, result = Failure(kind, sentence, self._worker.output()), None
-        if failure and self._deserves_another_try(failure):
+        self._ran_s += self._worker.ran_s
+        if failure and failure.kind == "killed" and self._ran_s >= self._most_s:
+            failure = replace(failure, kind="timeout", sentence=self._hanging_sentence())
+        elif failure and self._deserves_another_try(failure):
             self._try()
             return None
         outcome = Outcome(self._call[1], result, failure, self._tries)
@@ -98,6 +103,17 @@ class Supervisor:
         assert self._worker is not None
         self._tries += 1
         self._worker.start(*self._call)
+
+    @property
+    def _most_s(self) -> float:
+        """What a job that hangs is given when nobody kills it, and so all that one is given which is killed."""
+        return self.policy.attempts * self.policy.limits.timeout_s
+
+    def _hanging_sentence(self) -> str:
+        return (
+            f"ran {self._ran_s:.0f} s in {self._tries} attempts, which were killed from outside, without an end: more "
+            f"than the {self._most_s:g} s that {self.policy.attempts} attempts have"
+        )
 
     def _deserves_another_try(self, failure: Failure) -> bool:
         assert self._worker is not None

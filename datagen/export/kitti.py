@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from datagen.dataset import StereoDataset, StereoSample
 from datagen.export.lidar import lidar_mask
 from datagen.formats import write_png
-from datagen.integrity import intact
 from storage import Tree
 
 FOLDERS = {"train": "training", "val": "validation", "test": "testing"}
@@ -38,7 +37,7 @@ def export_kitti(
     total, done = sum(map(len, sets)), 0
     for frames in sets:
         folder, names = FOLDERS[frames.split], []
-        for number, sample in enumerate(intact(frames)):
+        for number, sample in enumerate(frames):
             _write_frame(out, folder, number, sample, lidar_beams)
             names.append(f"{number:06d}_10 {sample.name}\n")
             done += 1

@@ -10,7 +10,6 @@ from itertools import groupby
 from pathlib import Path
 
 from datagen.dataset import StereoDataset
-from datagen.integrity import intact
 from datagen.layout import RENDER_PASSES
 from datagen.manifest import read_manifest
 from storage import Tree
@@ -23,10 +22,11 @@ def export_sceneflow(sets: Sequence[StereoDataset], out: Tree, progress: Callabl
     total, done = sum(map(len, sets)), 0
     for frames in sets:
         layout = frames.layout
-        for scene, samples in groupby(intact(frames), lambda sample: sample.scene):
+        for scene, group in groupby(frames, lambda sample: sample.scene):
+            samples = list(group)
             manifest = read_manifest(layout.local(layout.manifest(frames.split, scene)))
             for entry in manifest.files:
                 if Path(entry.path).parts[0] in KINDS:
-                    out.write(entry.path, layout.local(layout.root / entry.path).read_bytes())
-            done += len(list(samples))
+                    out.write(entry.path, samples[0].intact(layout.root / entry.path).read_bytes())
+            done += len(samples)
             progress(done, total)

@@ -5,6 +5,7 @@ The members of a sample have the very bytes of the data set's files; the same fr
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import tarfile
@@ -12,10 +13,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 
 from datagen.dataset import StereoDataset, StereoSample
-from datagen.integrity import intact
+from datagen.errors import DatasetError
 from datagen.layout import EYES, KINDS, RENDER_PASSES, TARGETS
-from datagen.manifest import FileEntry, file_entry, seal
-from datagen.sources.webdataset import INDEX_NAME
+from datagen.manifest import FileEntry, file_entry, read_manifest, seal
+from datagen.recipe import read_recipe, recipe_to_text
+from datagen.sources.webdataset import INDEX_NAME, META
 from storage import Tree
 
 
@@ -37,20 +39,32 @@ def export_webdataset(
             index[name] = []
             with out.writing(name) as path:
                 with tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as tar:
-                    for sample in intact(frames[first : first + frames_per_shard]):
+                    for sample in frames[first : first + frames_per_shard]:
                         index[name].append(_add(tar, sample))
                         done += 1
                         progress(done, total)
                 files.append(replace(file_entry(path.parent, path), path=name))
-    recipe = sets[0].layout.recipe
-    out.write(recipe.name, recipe.read_bytes())
+    out.write(sets[0].layout.recipe.name, _recipe_text(sets[0][0]).encode())
     out.write(INDEX_NAME, seal({"shards": index, "files": [asdict(entry) for entry in files]}).encode())
+
+
+def _recipe_text(sample: StereoSample) -> str:
+    """The recipe that a sample's scene was rendered by. Raises DatasetError if the data set's is another one."""
+    layout = sample.layout
+    recipe = read_recipe(layout.recipe)
+    manifest = read_manifest(layout.local(layout.manifest(sample.split, sample.scene)))
+    if recipe.settings_sha256() != manifest.recipe_sha256:
+        raise DatasetError(f"{layout.recipe}: is not the recipe that the scenes were rendered by")
+    return recipe_to_text(recipe)
 
 
 def _add(tar: tarfile.TarFile, sample: StereoSample) -> str:
     """Add a sample's members; return its key."""
     key = f"{sample.split}-{sample.scene:04d}-{sample.frame:04d}"
-    for what, data in _members(sample):
+    members = dict(_members(sample))
+    digests = {what: hashlib.sha256(data).hexdigest() for what, data in members.items()}
+    members[META] = json.dumps(_meta(sample) | {"sha256": digests}, sort_keys=True).encode()
+    for what, data in members.items():
         member = tarfile.TarInfo(f"{key}.{what}")  # Owner, rights and time are the same for all.
         member.size = len(data)
         tar.addfile(member, io.BytesIO(data))
@@ -62,8 +76,7 @@ def _members(sample: StereoSample) -> Iterator[tuple[str, bytes]]:
         for eye in EYES if KINDS[kind].per_eye else ():
             path = sample.layout.file(kind, sample.split, sample.scene, eye, sample.frame)
             what = eye if kind in RENDER_PASSES.values() else f"{kind}_{eye}"
-            yield f"{what}{path.suffix}", sample.layout.local(path).read_bytes()
-    yield "meta.json", json.dumps(_meta(sample), sort_keys=True).encode()
+            yield f"{what}{path.suffix}", sample.intact(path).read_bytes()
 
 
 def _meta(sample: StereoSample) -> dict[str, object]:

@@ -6,11 +6,12 @@ Gradients are derived from the disparity, which gives the native tree's numbers 
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -31,6 +32,9 @@ from datagen.shards import list_shards, local_copy, read_sample_member, shard_in
 from datagen.source import SourceFormat
 
 INDEX_NAME = "index.json"
+META = "meta.json"
+"""The member that describes its sample, with the SHA-256 of the other ones."""
+_DESCRIPTIONS_KEPT = 256
 _SHARD_NAME = re.compile(rf"({'|'.join(SPLITS)})-\d{{6,}}\.tar")
 
 
@@ -144,7 +148,22 @@ def _read(shard: str, key: str, member: str, decode: Any) -> Any:
         raise FormatError(f"{shard}: has no sample {key}") from error
     if data is None:
         raise FormatError(f"{shard}: its sample {key} has no {member}")
+    digest = _digests(shard, key).get(member)
+    if digest is not None and hashlib.sha256(data).hexdigest() != digest:
+        raise FormatError(f"{shard}: {key}.{member} is damaged, its SHA-256 is not the one in {META}")
     return decode(data, f"{shard}: {key}.{member}")
+
+
+@lru_cache(maxsize=_DESCRIPTIONS_KEPT)
+def _digests(shard: str, key: str) -> dict[str, str]:
+    """The SHA-256 of a sample's members, as far as it says them; shards that others made may not."""
+    content = read_sample_member(shard, key, META)
+    if content is None:
+        return {}
+    try:
+        return dict(json.loads(content).get("sha256", {}))
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        raise FormatError(f"{shard}: {key}.{META} does not describe its sample ({error})") from error
 
 
 FORMATS = (SourceFormat("webdataset", "WebDataset shards", _recognises, _find, SPLITS),)

@@ -12,6 +12,7 @@ import tyro
 
 from datagen.manifest import SceneManifest
 from datagen.repair import broken_scenes, repair_dataset
+from datagen.scene_check import SAMPLED_PIXELS
 from datagen.verify import verify_dataset
 from datagen.verify_report import VerifyReport
 from stereoforge.errors import CommandError, UsageError
@@ -31,10 +32,14 @@ class Verify:
     """Render the broken scenes again, exactly those, and check them again."""
     workers: Annotated[int | None, shown("N", "one a core")] = None
     """Worker processes."""
+    geometry_pixels: Annotated[int, shown("N")] = SAMPLED_PIXELS
+    """Random pixels of each view to compare with the scene's geometry; 0 leaves that out, which is most of the time."""
 
     def run(self) -> None:
         if self.workers is not None and self.workers < 1:
             raise UsageError(f"--workers must be at least 1, got {self.workers}")
+        if self.geometry_pixels < 0:
+            raise UsageError(f"--geometry-pixels must be at least 0, got {self.geometry_pixels}")
         report = self._verify()
         _print_problems(report)
         broken = broken_scenes(report.problems)
@@ -53,7 +58,13 @@ class Verify:
     def _verify(self, only: Collection[tuple[str, int]] | None = None) -> VerifyReport:
         cores = len(os.sched_getaffinity(0))
         with _progress("verifying") as on_progress:
-            return verify_dataset(self.data, on_progress, workers=self.workers or cores, only=only)
+            return verify_dataset(
+                self.data,
+                on_progress,
+                workers=self.workers or cores,
+                sampled_pixels=self.geometry_pixels,
+                only=only,
+            )
 
     def _repair(self, broken: list[tuple[str, int]]) -> None:
         with _progress("rendering") as on_progress:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from datagen.formats import write_camera_data, write_gradient, write_occlusion, write_pfm, write_png
 from datagen.layout import FIRST_FRAME, Layout
-from datagen.manifest import FileEntry, SceneManifest, file_entry, write_manifest
+from datagen.manifest import FileEntry, SceneManifest, file_entry, read_manifest, write_manifest
 from datagen.recipe import Recipe, write_recipe
 from scenes import FAMILIES, Scene, scene_to_json
 from scenes.shapes.basic import Plane
@@ -237,3 +237,11 @@ def commit(layout: Layout, split: str, number: int, files: list[FileEntry], reci
         versions={},
     )
     write_manifest(layout.manifest(split, number), manifest)
+
+
+def vouch(root: Path, split: str, scene: int) -> None:
+    """Make a scene's manifest say of its files what they are now."""
+    path = Layout(root).manifest(split, scene)
+    manifest = read_manifest(path)
+    entries = tuple(file_entry(root, root / entry.path) for entry in manifest.files)
+    write_manifest(path, dataclasses.replace(manifest, files=entries))

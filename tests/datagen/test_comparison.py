@@ -12,6 +12,7 @@ from datagen import DatasetError, StereoDataset
 from datagen.comparison import write_comparison
 from datagen.formats import write_pfm
 from datagen.layout import Layout
+from tests.datagen.analytic_world import vouch
 
 
 def distances(page: str) -> list[float]:
@@ -37,9 +38,10 @@ def test_a_set_and_its_copy_are_at_distance_0(
 def test_numbers_are_each_set_s_own(analytic_dataset: Path, own_dataset: Path, tmp_path: Path) -> None:
     layout = Layout(own_dataset)
     for split in ("train", "test"):
-        for sample in StereoDataset(own_dataset, split):
-            path = layout.file("disparity", split, sample.scene, "left", sample.frame)
-            write_pfm(path, sample.disparity_left + 100)
+        disparities = [(sample, sample.disparity_left) for sample in StereoDataset(own_dataset, split)]
+        for sample, there in disparities:
+            write_pfm(layout.file("disparity", split, sample.scene, "left", sample.frame), there + 100)
+            vouch(own_dataset, split, sample.scene)
     progress: list[tuple[int, int]] = []
     write_comparison(
         analytic_dataset, own_dataset, tmp_path / "page.html", progress=lambda *done: progress.append(done)

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen import DatasetError, FormatError, StereoDataset
+from datagen import DatasetError, StereoDataset
 from datagen.formats import write_pfm, write_png
 from datagen.layout import Layout
-from tests.datagen.analytic_world import HEIGHT, WIDTH, make_scene, render
+from tests.datagen.analytic_world import HEIGHT, WIDTH, make_scene, render, vouch
 
 
 def test_samples_in_order_with_their_names(analytic_dataset: Path) -> None:
@@ -57,7 +57,7 @@ def test_arrays_are_read_once_and_only_when_asked_for(own_dataset: Path) -> None
     assert sample.disparity_left is first
     fresh = StereoDataset(own_dataset, "train")[0]
     assert fresh.disparity_right.shape == (HEIGHT, WIDTH)
-    with pytest.raises(FormatError, match=r"disparity/TRAIN/A/0000/left/0006\.pfm: cannot be read"):
+    with pytest.raises(DatasetError, match=r"disparity/TRAIN/A/0000/left/0006\.pfm: cannot be read"):
         _ = fresh.disparity_left
 
 
@@ -99,25 +99,42 @@ def test_a_damaged_manifest_is_named(own_dataset: Path) -> None:
 
 
 def test_arrays_of_another_size_or_type_than_the_left_image(own_dataset: Path) -> None:
-    layout, sample = Layout(own_dataset), StereoDataset(own_dataset, "train")[0]
+    layout = Layout(own_dataset)
     write_pfm(layout.file("disparity", "train", 0, "left", 6), np.zeros((HEIGHT, WIDTH + 1)))
+    write_png(layout.file("frames_cleanpass", "train", 0, "right", 6), np.zeros((HEIGHT, WIDTH), np.uint8))
+    write_png(layout.file("object_index", "train", 0, "left", 6), np.zeros((HEIGHT, WIDTH), np.uint8))
+    vouch(own_dataset, "train", 0)
+    sample = StereoDataset(own_dataset, "train")[0]
     with pytest.raises(DatasetError, match=r"0006\.pfm: holds \(64, 97\) of float32 where .* \(64, 96\)"):
         _ = sample.disparity_left
-    write_png(layout.file("frames_cleanpass", "train", 0, "right", 6), np.zeros((HEIGHT, WIDTH), np.uint8))
     with pytest.raises(DatasetError, match=r"right/0006\.png: holds \(64, 96\) of uint8 .* \(64, 96, 3\)"):
         _ = sample.right
-    write_png(layout.file("object_index", "train", 0, "left", 6), np.zeros((HEIGHT, WIDTH), np.uint8))
     with pytest.raises(DatasetError, match=r"object_index.*holds \(64, 96\) of uint8 .* of uint16"):
         _ = sample.object_index_left
+
+
+def test_a_file_that_is_not_the_manifest_s_is_refused_when_it_is_read(own_dataset: Path) -> None:
+    sample = StereoDataset(own_dataset, "train")[0]
+    path = Layout(own_dataset).file("disparity", "train", 0, "right", 6)
+    content = bytearray(path.read_bytes())
+    content[-3] ^= 1  # another number, which a PFM itself cannot tell
+    path.write_bytes(content)
+    assert sample.disparity_left is not None
+    with pytest.raises(
+        DatasetError, match=f"{path}: is damaged, its SHA-256 is not the manifest's; verify --repair"
+    ):
+        sample.disparity_right  # noqa: B018
 
 
 def test_a_damaged_scene_record_is_named(own_dataset: Path) -> None:
     record = Layout(own_dataset).scene_record("train", 0)
     for content in ("{", '{"family": "x"}', "[]"):
         record.write_text(content)
+        vouch(own_dataset, "train", 0)
         with pytest.raises(DatasetError, match=r"scenes/TRAIN/A/0000\.json: is not a scene"):
             _ = StereoDataset(own_dataset, "train")[0].scene_record
     record.write_bytes(b"\xff\xfe")
+    vouch(own_dataset, "train", 0)
     with pytest.raises(DatasetError, match=r"scenes/TRAIN/A/0000\.json: is not a scene"):
         _ = StereoDataset(own_dataset, "train")[0].scene_record
 

@@ -36,6 +36,9 @@ def misbehave(job: tuple[str, Path]) -> str:
             os.kill(os.getpid(), signal.SIGKILL)
     if kind == "hang":
         time.sleep(600)
+    if kind == "hang and be killed":
+        time.sleep(0.4)
+        os.kill(os.getpid(), signal.SIGKILL)
     return f"{kind} done"
 
 
@@ -77,6 +80,19 @@ class KillsOnArrival:
             starts.write("x")
         if len((self.folder / "starts").read_text()) <= self.times:
             os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.slow
+def test_a_job_that_hangs_is_found_out_though_every_attempt_is_killed_before_its_time(tmp_path: Path) -> None:
+    executor = LocalExecutor(({},), WorkerPolicy(Limits(timeout_s=0.6)))
+    (outcome,) = executor.run(misbehave, [("hang and be killed", tmp_path)])
+    assert outcome.failure is not None
+    assert outcome.failure.kind == "timeout"
+    assert (
+        "attempts, which were killed from outside, without an end: more than the 1.2 s"
+        in outcome.failure.sentence
+    )
+    assert 2 <= outcome.attempts <= 3
 
 
 def succeed(job: object) -> bool:

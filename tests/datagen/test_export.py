@@ -131,13 +131,38 @@ def test_webdataset_shards_stream_the_same_bytes(analytic_dataset: Path, tmp_pat
 
 @pytest.mark.parametrize("kind", EXPORTERS)
 def test_a_damaged_data_set_is_not_exported(kind: str, own_dataset: Path, tmp_path: Path) -> None:
-    damaged = Layout(own_dataset).file("occlusion", "train", 0, "right", 6)
+    damaged = Layout(own_dataset).file("disparity", "train", 0, "left", 6)
     content = bytearray(damaged.read_bytes())
     content[len(content) // 2] ^= 1
     damaged.write_bytes(content)
     sets = [StereoDataset(own_dataset, "train")]
     with pytest.raises(DatasetError, match=f"{damaged}: is damaged, its SHA-256 is not the manifest's"):
         EXPORTERS[kind](sets, open_tree(tmp_path / "out"), ExportOptions(), lambda *_: None)
+
+
+def test_a_recipe_of_other_settings_is_not_exported(own_dataset: Path, tmp_path: Path) -> None:
+    recipe = own_dataset / "recipe.yaml"
+    recipe.write_text(recipe.read_text().replace("seed: 0", "seed: 1"))
+    sets = [StereoDataset(own_dataset, "train")]
+    with pytest.raises(DatasetError, match="is not the recipe that the scenes were rendered by"):
+        EXPORTERS["webdataset"](sets, open_tree(tmp_path / "out"), ExportOptions(), lambda *_: None)
+
+
+def test_a_damaged_member_of_a_shard_is_refused_when_it_is_read(
+    analytic_dataset: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["export", str(analytic_dataset), "--format", "webdataset", "--out", str(tmp_path / "out")])
+    shard = tmp_path / "out" / "train-000000.tar"
+    whole = Layout(analytic_dataset).file("disparity", "train", 0, "left", 7).read_bytes()
+    content = bytearray(shard.read_bytes())
+    content[content.index(whole) + len(whole) - 100] ^= 1
+    shard.write_bytes(content)
+    frames = open_source(str(tmp_path / "out")).frames("train")
+    assert frames[0].disparity_left is not None
+    assert frames[1].left is not None
+    with pytest.raises(DatasetError, match=r"train-0000-0007\.disparity_left\.pfm is damaged, its SHA-256"):
+        frames[1].disparity_left  # noqa: B018
 
 
 def test_damage_to_shards_is_found(analytic_dataset: Path, tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ def test_what_cannot_be_shown_is_said(own_dataset: Path, tmp_path: Path) -> None
     layout = Layout(own_dataset)
     picture = layout.file("frames_cleanpass", "train", 0, "right", 6)
     picture.write_bytes(picture.read_bytes()[:-100])
-    with pytest.raises(DatasetError, match=r"right/0006\.png: is a PNG file cut off"):
+    with pytest.raises(DatasetError, match=r"right/0006\.png: has \d+ bytes where the manifest has \d+"):
         write_gallery(own_dataset, out)
     for split, scene in (("train", 0), ("train", 1), ("test", 0)):
         layout.manifest(split, scene).unlink()
