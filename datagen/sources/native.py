@@ -10,10 +10,11 @@ from datagen.dataset import StereoDataset, StereoSample, open_layout
 from datagen.frame import StereoFrame
 from datagen.layout import SPLITS
 from datagen.source import SourceFormat
+from datagen.sources.webdataset import INDEX_NAME
 
 
 def _recognises(root: Path) -> bool:
-    return (root / "recipe.yaml").is_file()
+    return (root / "recipe.yaml").is_file() and not (root / INDEX_NAME).is_file()  # Shards have a recipe too.
 
 
 def _find_frames(location: str, split: str, render_pass: str) -> Sequence[StereoFrame]:
