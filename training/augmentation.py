@@ -64,6 +64,10 @@ class AugmentationConfig:
     stay as they are."""
     vertical_flip: float = 0.0
     """Probability of turning upside down."""
+    shear: float = 0.0
+    """A quarter of the pairs have the rows of their right view moved, further and further down or up the image, as if
+    all that is seen leant: U(-this, this) pixels of disparity a pixel down are added (ours). So a network that was
+    shown things in the air has seen the slant of a road, too."""
     log_brightness: float = 0.4
     """Factor exp U(-this, this), and so on for gamma, contrast and the factor of each colour channel."""
     log_gamma: float = 0.4
@@ -75,7 +79,8 @@ class AugmentationConfig:
     """Spread of the small extra gamma, brightness, contrast and colour change of the right view."""
 
 
-NO_AUGMENTATION = AugmentationConfig(0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_AUGMENTATION = AugmentationConfig(0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+SHEARED = 0.25
 WINDOW_TRIALS = 50
 RIGHT_ONLY_GROWTH_STEPS = 50_000
 
@@ -112,7 +117,8 @@ def augment(
     if rng.random() < config.vertical_flip:
         pair = turn_over(pair)
     window = draw_window(rng, pair.left.shape[:2], size, config)
-    sample = cut(pair, window, size, draw_tone_curves(rng, config, step))
+    tone_curves = draw_tone_curves(rng, config, step)
+    sample = cut(pair, window, size, tone_curves, draw_shear(rng, config))
     noise = np.float32(rng.uniform(0, config.noise))
     if noise > 0:
         left = sample.left + noise * draw_normal(rng, sample.left.shape)
@@ -175,8 +181,20 @@ def draw_window(
     return Window(float(left[trial]), float(top[trial]), float(zoom_x[trial]), float(zoom_y[trial]))
 
 
+def draw_shear(rng: np.random.Generator, config: AugmentationConfig) -> float:
+    """Disparity to add per row of the source, px; nothing is drawn where the range is empty."""
+    if config.shear == 0:
+        return 0.0
+    slope = rng.uniform(-config.shear, config.shear)
+    return float(slope) if rng.random() < SHEARED else 0.0
+
+
 def cut(
-    pair: StereoPair, window: Window, size: tuple[int, int], tone_curves: tuple[Float32, Float32]
+    pair: StereoPair,
+    window: Window,
+    size: tuple[int, int],
+    tone_curves: tuple[Float32, Float32],
+    shear: float = 0.0,
 ) -> TrainingSample:
     """Recolour and resample both views, and the left truth, through one window.
 
@@ -185,6 +203,8 @@ def cut(
 
     Args:
         tone_curves: (256, 3) colours in 0..1 of the levels 0..255, for the left and the right view.
+        shear: Disparity added from row to row, px of the source; none in the window's first row, or, where it is
+            negative, in its last: disparities stay positive. What hides what in a row stays as it was.
     """
     rows = window.top_px + (np.arange(size[0]) + 0.5) / window.zoom_y
     columns = window.left_px + (np.arange(size[1]) + 0.5) / window.zoom_x
@@ -192,11 +212,15 @@ def cut(
     nearest_columns = _nearest(columns, pair.left.shape[1])
     gradient = missing_at_borders(forward_differences(pair.disparity_left))
     nearest = np.ix_(nearest_rows, nearest_columns)
+    disparity, gradient = pair.disparity_left[nearest], gradient[nearest]
+    moves = shear * (rows - (rows[0] if shear > 0 else rows[-1]))
+    gradient = gradient + np.array([0.0, shear], np.float32)
+    columns_right = columns if shear == 0 else columns + moves[:, None]
     return TrainingSample(
         left=sample_bilinear(pair.left, rows, columns, tone_curves[0]),
-        right=sample_bilinear(pair.right, rows, columns, tone_curves[1]),
-        disparity=pair.disparity_left[nearest] * np.float32(window.zoom_x),
-        gradient=gradient[nearest] * np.array([1.0, window.zoom_x / window.zoom_y], np.float32),
+        right=sample_bilinear(pair.right, rows, columns_right, tone_curves[1]),
+        disparity=(disparity + moves[:, None].astype(np.float32)) * np.float32(window.zoom_x),
+        gradient=gradient * np.array([1.0, window.zoom_x / window.zoom_y], np.float32),
     )
 
 
@@ -210,23 +234,33 @@ def missing_at_borders(gradient: Float32) -> Float32:
 def sample_bilinear(
     image: NDArray[np.uint8], rows: NDArray[np.float64], columns: NDArray[np.float64], tone_curve: Float32
 ) -> Float32:
-    """A recoloured image at a grid of points, (len(rows), len(columns), 3).
+    """A recoloured image at a grid of points, (len(rows), columns.shape[-1], 3).
 
     Pixel centres lie at + 0.5. Not OpenCV's warp, which rounds positions to 1/32 px: an error in disparity.
+
+    Args:
+        rows: (H,).
+        columns: (W,), or (H, W) where each row has its own.
     """
     row, row_weight = _neighbours(rows, image.shape[0])
     column, column_weight = _neighbours(columns, image.shape[1])
-    first_row, first_column = int(row[0]), int(column[0])
-    part = image[first_row : row[-1] + 2, first_column : column[-1] + 2]
+    first_row, first_column = int(row[0]), int(column.min())
+    part = image[first_row : row[-1] + 2, first_column : int(column.max()) + 2]
     colors = cv2.LUT(np.ascontiguousarray(part), tone_curve[None])
     row, column = row - first_row, column - first_column
     below = np.minimum(row + 1, colors.shape[0] - 1)
     right = np.minimum(column + 1, colors.shape[1] - 1)
     lines = np.take(colors, row, axis=0)
     lines += (np.take(colors, below, axis=0) - lines) * row_weight[:, None, None]
-    values: Float32 = np.take(lines, column, axis=1)
-    values += (np.take(lines, right, axis=1) - values) * column_weight[:, None]
+    values: Float32 = _at_columns(lines, column)
+    values += (_at_columns(lines, right) - values) * column_weight[..., None]
     return values
+
+
+def _at_columns(lines: Float32, columns: NDArray[np.int64]) -> Float32:
+    if columns.ndim == 1:
+        return np.take(lines, columns, axis=1)
+    return np.take_along_axis(lines, columns[..., None], axis=1)
 
 
 IDENTITY_CURVE: Float32 = np.repeat(np.linspace(0, 1, 256, dtype=np.float32)[:, None], 3, axis=1)

@@ -88,7 +88,8 @@ def estimate(
         inputs, regression = confnet_inputs(regressor, confnet, left, right)
         confidence = resize(confnet.confidence(*inputs), height, width)
     if gradnet is not None:
-        gradient = resize(gradnet(left, regression.features), height, width)
+        seen = gradnet.inputs(left, right, regression.features, regression.disparity)
+        gradient = resize(gradnet(*seen), height, width)
         gradient = gradient * gradient.new_tensor([1.0, stretch_y / stretch_x]).view(1, 2, 1, 1)
     return Estimate(resize(regression.disparity, height, width) / stretch_x, confidence, gradient)
 

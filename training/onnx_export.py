@@ -72,7 +72,8 @@ class ExportedNetworks(nn.Module):
             inputs, regression = confnet_inputs(self.regressor, self.confnet, left, right)
             answers = [regression.disparity, self.confnet.confidence(*inputs)]
         if self.gradnet is not None:
-            answers.append(self.gradnet(left, regression.features))
+            seen = self.gradnet.inputs(left, right, regression.features, regression.disparity)
+            answers.append(self.gradnet(*seen))
         return tuple(answers)
 
 

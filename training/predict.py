@@ -143,7 +143,8 @@ class FreePredictor:
             seen = self._confnet.inputs(image, other, inputs.features, inputs.disparity, inputs.consistency)
             confidence = _as_array(self._confnet.confidence(*seen))[..., 0]
         if self._gradnet is not None:
-            gradient = _as_array(self._gradnet(image, inputs.features))
+            seen = self._gradnet.inputs(image, other, inputs.features, inputs.disparity)
+            gradient = _as_array(self._gradnet(*seen))
         return Prediction(_as_array(inputs.disparity)[..., 0], confidence, gradient)
 
 

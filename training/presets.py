@@ -4,10 +4,9 @@
 parameters, a 11 MB file) and `tiny` (for minutes on a laptop's CPU) change what short runs on few pairs need
 changed, all of it here: BatchNorm, a one-sided correlation, predictions in units of 16 px, a larger learning rate
 with warm-up and a cosine end, gradient clipping, a compressed loss schedule, milder colour changes, flips, heads
-that work at the features' half resolution, and a ConfNet that looks further around (dilations) and also sees matching
-costs around the disparity and how the disparity lies in its surroundings (`training.networks.evidence`): the features
-of a small regressor hold too little of both, and without them a random forest on features made by hand is better
-(docs/ablations.md).
+that work at the features' half resolution, look further around (dilations) and also see matching costs around the
+disparity, how the disparity lies in its surroundings and, for GradNet, their slopes (`training.networks.evidence`): the
+features of a small regressor hold too little of these (docs/ablations.md).
 """
 
 from __future__ import annotations
@@ -277,8 +276,8 @@ SMALL_GRADNET = GradNetPreset(
     crop_width=320,
     crop_height=128,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=100),
-    augmentation=SMALL_AUGMENTATION,
-    network=HeadConfig(width=32, hidden=64, dropout=0.0, normalization="batch", half_resolution=True),
+    augmentation=replace(SMALL_AUGMENTATION, shear=0.6),
+    network=replace(SMALL_CONFNET.network, dropout=0.0),
     validation_interval=500,
 )
 TINY_GRADNET = replace(

@@ -19,7 +19,7 @@ class Grad(Method):
     label: ClassVar[str] = "Gradient term only"
     needs: ClassVar[frozenset[str]] = frozenset({"confidence", "gradient"})
     search: ClassVar = {
-        "sigma_r": (1.0, 1.7, 2.55, 4.0, 6.0, 10.0, 16.0, 25.0, 40.0),
+        "sigma_r": (1.0, 1.7, 2.55, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0, 25.0, 40.0),
         "shape.power": (0.5, 1.0, 2.0, 3.0, 4.0),
         "alpha": (3.0, 10.0, 30.0, 100.0, 300.0),
         "confidence_floor": (1e-5, 1e-4, 1e-3, 3e-3, 1e-2),

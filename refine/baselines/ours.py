@@ -23,7 +23,7 @@ class Ours(Method):
     label: ClassVar[str] = "Ours"
     needs: ClassVar[frozenset[str]] = frozenset({"confidence", "gradient"})
     search: ClassVar = {
-        "parameters.sigma_r": (1.0, 1.7, 2.55, 4.0, 6.0, 10.0, 16.0, 25.0, 40.0),
+        "parameters.sigma_r": (1.0, 1.7, 2.55, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0, 25.0, 40.0),
         "shape.power": (0.5, 1.0, 2.0, 3.0, 4.0),
         "parameters.alpha": (3.0, 10.0, 30.0, 100.0, 300.0),
         "parameters.beta": (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0),

@@ -64,7 +64,8 @@ class StudyPlan:
     out."""
     tuning_frames: int = 0
     """Validation frames of each training domain on which the methods' parameters are chosen; 0 takes the
-    defaults."""
+    defaults. Of rendered worlds each is of another scene: parameters chosen on several frames of a few scenes are those
+    scenes' (the parameters chosen on 8 scenes lowered the end-point error to 0.88 there, to 0.94 on 40 others)."""
     forest: bool = False
     """Whether the random-forest confidence is trained on the subject, as ConfNet's rival."""
     methods: tuple[str, ...] = ()
@@ -107,10 +108,16 @@ class StudyPlan:
 
     def recipe(self, name: str, splits: tuple[str, ...]) -> Recipe:
         """What to render of a domain for training or for testing. Raises DatasetError for a wrong config."""
-        domain = self.domains[name]
+        scenes = {split: self.domains[name].scenes.get(split, 0) for split in splits}
+        return self._recipe(name, scenes, self.domains[name].config)
+
+    def tuning_recipe(self, name: str) -> Recipe:
+        """What to render of a domain for choosing parameters: one frame of each validation scene."""
+        return self._recipe(name, {"val": self.tuning_frames}, {**self.domains[name].config, "frames": 1})
+
+    def _recipe(self, name: str, scenes: dict[str, int], config: dict[str, Any]) -> Recipe:
         width, height = self.size
-        world = {"family": name, **_sized(domain.config, width, height)}
-        scenes = {split: domain.scenes.get(split, 0) for split in splits}
+        world = {"family": name, **_sized(config, width, height)}
         plain = {"world": world, "scenes": scenes, "seed": self.seed, "samples": self.samples}
         return recipe_from_plain(plain, f"the domain {name}")
 

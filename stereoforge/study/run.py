@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 
+from datagen import Recipe
 from datagen.dataset import open_layout
 from datagen.errors import DatasetError
 from datagen.source import open_source
@@ -112,7 +113,7 @@ class _Study:
     @property
     def jobs(self) -> list[Job]:
         """All, in an order in which each finds what it needs."""
-        data = [*self.training_data.values(), *self.test_data.values()]
+        data = [*self.training_data.values(), *self.tuning_data.values(), *self.test_data.values()]
         return [
             *(each.job for each in data if each.job is not None),
             *self.statistics.values(),
@@ -133,17 +134,31 @@ class _Study:
     def test_data(self) -> dict[str, _Data]:
         return {name: self._data(name, "test", TEST_SPLITS) for name in self.plan.test}
 
+    @cached_property
+    def tuning_data(self) -> dict[str, _Data]:
+        """What parameters are chosen on, where the plan asks for it and there are validation frames."""
+        if not self.plan.tuning_frames:
+            return {}
+        return {name: self._tuning_data(name) for name in self.plan.train if self._has_validation(name)}
+
+    def _tuning_data(self, name: str) -> _Data:
+        if self.plan.domains[name].source is not None:
+            return self.training_data[name]
+        return self._rendered(name, "choose parameters", "tune", self.plan.tuning_recipe(name))
+
     def _data(self, name: str, purpose: str, splits: tuple[str, ...]) -> _Data:
         source = self.plan.domains[name].source
         if source is not None:
             return _Data(source, _fingerprint(source, splits))
-        recipe = self.plan.recipe(name, splits)
+        return self._rendered(name, purpose, purpose, self.plan.recipe(name, splits))
+
+    def _rendered(self, name: str, verb: str, purpose: str, recipe: Recipe) -> _Data:
         pairs = sum(recipe.scenes.values()) * recipe.world.frames
         seconds = pairs * PAIR_SECONDS * recipe.world.width * recipe.world.height / (384 * 192)
         job = make_job(
             self.out / "data",
             f"{name}-{purpose}",
-            f"rendering {pairs} pairs of {name} to {purpose} on",
+            f"rendering {pairs} pairs of {name} to {verb} on",
             {"recipe": to_plain(recipe)},
             seconds,
             lambda folder: render_all(recipe, folder / DATASET),
@@ -229,10 +244,8 @@ class _Study:
 
     @cached_property
     def tuning(self) -> dict[str, Job]:
-        """Choosing the methods' parameters, where the plan asks for it and there is a validation split."""
-        if not self.plan.tuning_frames:
-            return {}
-        return {name: self._tuning_job(name) for name in self.plan.train if self._has_validation(name)}
+        """Choosing the methods' parameters."""
+        return {name: self._tuning_job(name, data) for name, data in self.tuning_data.items()}
 
     def _has_validation(self, name: str) -> bool:
         domain = self.plan.domains[name]
@@ -240,8 +253,8 @@ class _Study:
             return domain.scenes.get("val", 0) > 0
         return len(open_source(domain.source).validation_frames()) > 0
 
-    def _tuning_job(self, name: str) -> Job:
-        jobs, data, count = self.networks[name], self.training_data[name], self.plan.tuning_frames
+    def _tuning_job(self, name: str, data: _Data) -> Job:
+        jobs, count = self.networks[name], self.plan.tuning_frames
 
         def run(folder: Path) -> None:
             collected = _collect(jobs, folder / "networks")

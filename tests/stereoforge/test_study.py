@@ -131,6 +131,8 @@ def test_the_shipped_plan_can_be_rendered() -> None:
         recipe = plan.recipe(name, ("train", "test"))
         assert (recipe.world.width, recipe.world.height, recipe.seed) == (*plan.size, plan.seed)
         assert recipe.scenes["test"] * recipe.world.frames >= 100
+    tuning = plan.tuning_recipe("flying_things")
+    assert (dict(tuning.scenes), tuning.world.frames) == ({"val": plan.tuning_frames}, 1)
     assert plan.subject == "flying_things"
     assert plan.recipe("flying_things", ("train",)).scenes["train"] * 4 >= 1000
 

@@ -17,6 +17,7 @@ from training.augmentation import (
     Window,
     augment,
     cut,
+    draw_shear,
     draw_tone_curves,
     draw_window,
     mirror,
@@ -51,11 +52,16 @@ def warp_error(sample: TrainingSample) -> float:
 
 
 @settings(max_examples=25, deadline=None)
-@given(seed=st.integers(0, 10_000), flip=st.booleans(), upside_down=st.booleans())
+@given(
+    seed=st.integers(0, 10_000),
+    flip=st.booleans(),
+    upside_down=st.booleans(),
+    shear=st.sampled_from([0.0, 0.5]),
+)
 def test_right_image_warped_by_the_disparity_is_the_left_one(
-    seed: int, flip: bool, upside_down: bool
+    seed: int, flip: bool, upside_down: bool, shear: float
 ) -> None:
-    config = replace(GEOMETRY, horizontal_flip=float(flip), vertical_flip=float(upside_down))
+    config = replace(GEOMETRY, horizontal_flip=float(flip), vertical_flip=float(upside_down), shear=shear)
     pair = slanted_plane(seed)
     sample = augment(np.random.default_rng(seed), pair, (64, 96), config)
     assert (sample.disparity >= 0).all()
@@ -125,6 +131,41 @@ def test_bilinear_sampling_against_a_loop() -> None:
         corners = image[y0 : y0 + 2, x0 : x0 + 2] / 255
         expected = np.einsum("i,j,ijc->c", [1 - wy, wy], [1 - wx, wx], corners)
         np.testing.assert_allclose(got[i, j], expected, atol=1e-6)
+
+
+def test_rows_with_columns_of_their_own() -> None:
+    rng = np.random.default_rng(1)
+    image = rng.integers(0, 256, (7, 9, 3), np.uint8)
+    rows, columns = np.sort(rng.uniform(0, 7, 5)), np.sort(rng.uniform(-2, 11, (5, 6)))
+    got = sample_bilinear(image, rows, columns, IDENTITY_CURVE)
+    for index in range(5):
+        alone = sample_bilinear(image, rows[index : index + 1], columns[index], IDENTITY_CURVE)
+        np.testing.assert_allclose(got[index], alone[0], atol=1e-6)
+
+
+@pytest.mark.parametrize("shear", [0.4, -0.4])
+def test_sheared_rows_gain_disparity_and_slope(shear: float) -> None:
+    """The left view stays; disparities grow by the shear from row to row and are nowhere less than they were."""
+    pair, window = slanted_plane(4), Window(5, 7, 1.25, 0.8)
+    plain = cut(pair, window, (48, 96), (IDENTITY_CURVE, IDENTITY_CURVE))
+    leant = cut(pair, window, (48, 96), (IDENTITY_CURVE, IDENTITY_CURVE), shear)
+    np.testing.assert_array_equal(leant.left, plain.left)
+    gained = leant.disparity - plain.disparity
+    expected = shear * np.arange(48) * 1.25 / 0.8
+    np.testing.assert_allclose(gained, np.repeat((expected - expected.min())[:, None], 96, 1), atol=1e-4)
+    np.testing.assert_allclose(
+        leant.gradient - plain.gradient, np.full((48, 96, 2), [0, shear * 1.25 / 0.8]), atol=1e-6
+    )
+
+
+def test_a_quarter_of_the_pairs_are_sheared() -> None:
+    config = replace(NO_AUGMENTATION, shear=0.5)
+    rng = np.random.default_rng(0)
+    drawn = np.array([draw_shear(rng, config) for _ in range(2000)])
+    assert 0.72 < (drawn == 0).mean() < 0.78
+    assert (np.abs(drawn) <= 0.5).all()
+    assert drawn.min() < -0.45
+    assert drawn.max() > 0.45
 
 
 def test_mirroring_twice_is_nothing() -> None:

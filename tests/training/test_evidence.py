@@ -1,4 +1,4 @@
-"""What ConfNet sees beside the published inputs, against plain loops over pixels."""
+"""What ConfNet and GradNet see beside the published inputs, against plain loops over pixels."""
 
 import numpy as np
 import torch
@@ -10,8 +10,12 @@ from training.networks.evidence import (
     LEFT_BORDER_CAP_PX,
     RESIDUAL_CEILING_PX,
     RESIDUAL_WINDOWS_PX,
+    SLOPE_CHANNELS,
+    SLOPE_WINDOWS_PX,
+    SMOOTH_WITHIN_PX,
     disparity_evidence,
     matching_costs,
+    smooth_slopes,
 )
 
 HEIGHT, WIDTH = 7, 48
@@ -73,6 +77,32 @@ def test_the_disparity_is_compared_with_its_surroundings() -> None:
     columns = np.broadcast_to(np.arange(WIDTH), (HEIGHT, WIDTH))
     np.testing.assert_allclose(evidence[-2], columns)
     np.testing.assert_allclose(evidence[-1], columns - disparity)
+
+
+def test_smooth_slopes_are_those_of_the_surface_beside_an_edge() -> None:
+    """A slanted plane in front of another one, 7 px nearer: far from the border between them each window has one slope;
+    across it, the mean of both by how much of either it holds, and nothing of the step."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    near = columns >= WIDTH // 2
+    disparity = np.where(near, 17 + 0.25 * columns - 0.125 * rows, 10 - 0.5 * columns / WIDTH)
+    slopes = smooth_slopes(torch.from_numpy(disparity)[None, None])[0].numpy()
+    across = np.diff(disparity, axis=1, append=disparity[:, -1:])
+    down = np.diff(disparity, axis=0, append=disparity[-1:])
+    smooth = (np.abs(across) <= SMOOTH_WITHIN_PX) & (np.abs(down) <= SMOOTH_WITHIN_PX)
+    assert not smooth[:, WIDTH // 2 - 1].any()
+    for index, window in enumerate(SLOPE_WINDOWS_PX):
+        for got, difference in zip(slopes[2 * index :], (across, down), strict=False):
+            expected = windowed_mean(difference * smooth, window) / windowed_mean(
+                smooth.astype(float), window
+            )
+            np.testing.assert_allclose(got, expected, atol=1e-9)
+
+
+def test_slopes_are_zero_where_nothing_is_smooth() -> None:
+    disparity = torch.arange(40.0).reshape(1, 1, 1, 40) * 3 + torch.zeros(1, 1, 6, 1)
+    slopes = smooth_slopes(disparity)
+    assert slopes.shape == (1, SLOPE_CHANNELS, 6, 40)
+    assert (slopes == 0).all()
 
 
 def windowed_mean(values: np.ndarray, window: int) -> np.ndarray:

@@ -19,7 +19,12 @@ from training.networks import (
     left_right_consistency,
     predict_right,
 )
-from training.networks.evidence import COST_OFFSETS_PX, EVIDENCE_CHANNELS
+from training.networks.evidence import (
+    COST_OFFSETS_PX,
+    EVIDENCE_CHANNELS,
+    SLOPE_CHANNELS,
+    smooth_slopes,
+)
 
 
 @pytest.mark.parametrize(
@@ -67,8 +72,20 @@ def test_confnet_sees_evidence_where_configured() -> None:
     differs = (joined != changed).flatten(2).any(2)[0]
     assert differs.nonzero().flatten().tolist() == list(range(9, 9 + len(COST_OFFSETS_PX)))
     assert network.confidence(*network.inputs(left, right, *maps)).shape == (1, 1, 32, 64)
-    with pytest.raises(ValueError, match="only ConfNet"):
-        GradNet(config)
+
+
+def test_gradnet_sees_evidence_where_configured() -> None:
+    torch.manual_seed(0)
+    config = HeadConfig(feature_channels=5, width=4, hidden=4, evidence=True)
+    left, right = torch.rand(2, 1, 3, 32, 64)
+    features, disparity = torch.rand(1, 5, 16, 32), torch.rand(1, 1, 32, 64) * 9
+    network, plain = GradNet(config), GradNet(replace(config, evidence=False))
+    assert plain.inputs(left, right, features, disparity) == (left, features)
+    joined = network.joined_input(*network.inputs(left, right, features, disparity))
+    assert joined.shape == (1, 8 + EVIDENCE_CHANNELS + SLOPE_CHANNELS, 32, 64)
+    torch.testing.assert_close(joined[:, :8], plain.joined_input(left, features))
+    torch.testing.assert_close(joined[:, -SLOPE_CHANNELS:], smooth_slopes(disparity))
+    assert network(*network.inputs(left, right, features, disparity)).shape == (1, 2, 32, 64)
 
 
 def test_inputs_are_standardized_with_fixed_numbers() -> None:

@@ -27,6 +27,7 @@ from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, He
 from training.predict import StereoPredictor
 from training.presets import JointPreset, Preset, RegressorPreset, find_preset
 from training.tasks import JointHeads, JointTask, StereoTask
+from training.tasks.joint import JointInputs
 from training.train import train
 from training.weights import read_summary
 
@@ -42,8 +43,9 @@ class GivenTask(JointTask):
         heads = JointHeads(ConfNet(HEAD), GradNet(HEAD))
         super().__init__(preset, DispNetCorr1D(DispNetConfig(width=0.0625)), heads, refinement, 1, 0)
 
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
-        return (batch["left"], batch["features"], batch["consistency"]), batch["initial"]
+    def inputs(self, batch: Batch) -> JointInputs:
+        seen = batch["left"], batch["features"]
+        return JointInputs((*seen, batch["consistency"]), seen, batch["initial"])
 
 
 def given_batch(samples: int = 2) -> Batch:
@@ -75,8 +77,8 @@ def joint(**changes: object) -> JointPreset:
 
 
 def refined(task: JointTask, batch: Batch) -> Tensor:
-    inputs, disparity = task.head_inputs(batch)
-    logits, gradient = task.network.confnet(*inputs), task.network.gradnet(*inputs[:-1])
+    confnet_sees, gradnet_sees, disparity = task.inputs(batch)
+    logits, gradient = task.network.confnet(*confnet_sees), task.network.gradnet(*gradnet_sees)
     return task.refine(batch["left"], disparity, logits, gradient)
 
 
@@ -86,11 +88,11 @@ def test_refines_as_the_method_does(form: str) -> None:
     ours = Ours(MRFParameters(30.0, 1.0, 4.0), ConfidenceShape(0.7, 2.0), form=form)  # type: ignore[arg-type]
     task, batch = GivenTask(joint(tolerance=1e-7), ours), given_batch(1)
     batch["left"] = (batch["left"] * 255).round() / 255
-    inputs, disparity = task.head_inputs(batch)
+    confnet_sees, gradnet_sees, disparity = task.inputs(batch)
     with torch.no_grad():
         got = refined(task, batch)[0, 0]
-        confidence = task.network.confnet.confidence(*inputs)[0, 0].numpy()
-        gradient = task.network.gradnet(*inputs[:-1])[0].permute(1, 2, 0).numpy()
+        confidence = task.network.confnet.confidence(*confnet_sees)[0, 0].numpy()
+        gradient = task.network.gradnet(*gradnet_sees)[0].permute(1, 2, 0).numpy()
     image = (batch["left"][0] * 255).round().byte().permute(1, 2, 0).numpy()
     expected = ours.solve(disparity[0, 0].numpy(), confidence, gradient, image).disparity
     np.testing.assert_allclose(got, expected, atol=2e-3)

@@ -20,6 +20,12 @@ LEFT_BORDER_CAP_PX = 160.0
 EVIDENCE_CHANNELS = len(COST_OFFSETS_PX) + 2 + 2 * len(RESIDUAL_WINDOWS_PX) + 2
 """Channels of `disparity_evidence`."""
 
+SMOOTH_WITHIN_PX = 2.0
+"""A pixel with a larger forward difference lies on an edge and says nothing of its surface's slope."""
+SLOPE_WINDOWS_PX = (5, 9, 17, 33, 65)
+SLOPE_CHANNELS = 2 * len(SLOPE_WINDOWS_PX)
+"""Channels of `smooth_slopes`."""
+
 
 def disparity_evidence(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
     """Matching costs around a disparity, its slopes, its distance to its surroundings and their roughness, its place.
@@ -66,10 +72,32 @@ def matching_costs(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
     return torch.cat(costs, dim=1).clamp(max=COST_CEILING)
 
 
+def smooth_slopes(disparity: Tensor) -> Tensor:
+    """Mean forward differences of the smooth pixels in windows around each pixel: the slope of a surface, from near and
+    far, without the edges between surfaces.
+
+    Args:
+        disparity: (B, 1, H, W) px, finite.
+
+    Returns:
+        (B, `SLOPE_CHANNELS`, H, W): dx and dy of each of `SLOPE_WINDOWS_PX`, 0 where a window holds no smooth pixel.
+    """
+    slopes = _differences(disparity)
+    smooth = (slopes.abs() <= SMOOTH_WITHIN_PX).all(dim=1, keepdim=True).to(slopes.dtype)
+    maps = torch.cat([slopes * smooth, smooth], dim=1)
+    means = [_box_mean(maps, window) for window in SLOPE_WINDOWS_PX]
+    return torch.cat([mean[:, :2] / mean[:, 2:].clamp(min=1e-6) for mean in means], dim=1)
+
+
 def _slopes(disparity: Tensor) -> Tensor:
+    return _differences(disparity).clamp(-SLOPE_CEILING_PX, SLOPE_CEILING_PX)
+
+
+def _differences(disparity: Tensor) -> Tensor:
+    """Forward differences [dx, dy], (B, 2, H, W), 0 in the last column or row."""
     along_x = F.pad(disparity[..., :, 1:] - disparity[..., :, :-1], (0, 1, 0, 0))
     along_y = F.pad(disparity[..., 1:, :] - disparity[..., :-1, :], (0, 0, 0, 1))
-    return torch.cat([along_x, along_y], dim=1).clamp(-SLOPE_CEILING_PX, SLOPE_CEILING_PX)
+    return torch.cat([along_x, along_y], dim=1)
 
 
 def _surroundings(disparity: Tensor, window: int) -> tuple[Tensor, Tensor]:

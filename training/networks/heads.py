@@ -35,7 +35,7 @@ class HeadConfig:
     """Of the 3x3 convolutions: how far apart, in pixels, they look. Features of a regressor have seen their
     surroundings already; a disparity's own have not (ours)."""
     evidence: bool = False
-    """ConfNet also sees `training.networks.evidence.disparity_evidence` (ours)."""
+    """Also see what the pair and the disparity itself say, `training.networks.evidence` (ours)."""
 
 
 class PixelHead(nn.Module):

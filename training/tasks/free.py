@@ -87,8 +87,11 @@ class FreeGradNetTask(StereoTask):
 
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
         """What the network sees, and the disparity it is about."""
-        matched = match_batch(batch["left"], batch["right"], self.matcher)
-        return (batch["left"], matched.features), matched.disparity
+        with torch.no_grad():
+            left, right = batch["left"], batch["right"]
+            matched = match_batch(left, right, self.matcher)
+            inputs = self.network.inputs(left, right, matched.features, matched.disparity)
+        return inputs, matched.disparity
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, _ = self.head_inputs(batch)

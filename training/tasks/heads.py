@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from typing import Self
 
 import torch
@@ -31,10 +30,6 @@ class HeadTask(StereoTask):
         super().__init__(preset, steps, seed)
         self.regressor = regressor.requires_grad_(False).eval()
 
-    @abstractmethod
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
-        """What the network sees, from the regressor run once; and the disparity it is about."""
-
     def train(self, mode: bool = True) -> Self:
         super().train(mode)
         self.regressor.eval()  # frozen means its BatchNorm statistics too
@@ -55,6 +50,7 @@ class ConfNetTask(HeadTask):
         self.correct_within_px = preset.correct_within_px
 
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+        """What the network sees, from the regressor run once; and the disparity it is about."""
         with torch.no_grad():
             inputs, regression = confnet_inputs(self.regressor, self.network, batch["left"], batch["right"])
         return inputs, regression.disparity
@@ -104,9 +100,12 @@ class GradNetTask(HeadTask):
         self.threshold_px = preset.gradient_threshold_px
 
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+        """What the network sees, from the regressor run once; and the disparity it is about."""
         with torch.no_grad():
-            regression = regress(self.regressor, batch["left"], batch["right"])
-        return (batch["left"], regression.features), regression.disparity
+            left, right = batch["left"], batch["right"]
+            regression = regress(self.regressor, left, right)
+            inputs = self.network.inputs(left, right, regression.features, regression.disparity)
+        return inputs, regression.disparity
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, _ = self.head_inputs(batch)

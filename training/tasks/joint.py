@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
@@ -41,6 +43,15 @@ class JointHeads(nn.Module):
         self.gradnet = gradnet
 
 
+class JointInputs(NamedTuple):
+    """What ConfNet and GradNet see of a batch."""
+
+    confnet: tuple[Tensor, ...]
+    gradnet: tuple[Tensor, ...]
+    disparity: Tensor
+    """(B, 1, H, W) px, which they are about."""
+
+
 class JointTask(HeadTask):
     """L1 of the refined disparity and of its gradient, and a share of what the heads learned from before.
 
@@ -65,13 +76,13 @@ class JointTask(HeadTask):
         self.refinement = refinement
         self.losses = preset
 
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
-        """What ConfNet sees (GradNet sees the first two of it), and the disparity it is about."""
+    def inputs(self, batch: Batch) -> JointInputs:
+        """What the two networks see, from the regressor run once."""
+        left, right = batch["left"], batch["right"]
         with torch.no_grad():
-            inputs, regression = confnet_inputs(
-                self.regressor, self.network.confnet, batch["left"], batch["right"]
-            )
-        return inputs, regression.disparity
+            confnet, regression = confnet_inputs(self.regressor, self.network.confnet, left, right)
+            gradnet = self.network.gradnet.inputs(left, right, regression.features, regression.disparity)
+        return JointInputs(confnet, gradnet, regression.disparity)
 
     def refine(self, image: Tensor, disparity: Tensor, logits: Tensor, gradient: Tensor) -> Tensor:
         """The refined disparity (B, 1, H, W), differentiable in ConfNet's logits and GradNet's gradient."""
@@ -89,8 +100,8 @@ class JointTask(HeadTask):
         )[:, None]
 
     def loss(self, batch: Batch) -> Tensor:
-        inputs, disparity = self.head_inputs(batch)
-        logits, gradient = self.network.confnet(*inputs), self.network.gradnet(*inputs[:2])
+        confnet_sees, gradnet_sees, disparity = self.inputs(batch)
+        logits, gradient = self.network.confnet(*confnet_sees), self.network.gradnet(*gradnet_sees)
         own = confidence_cross_entropy(
             logits, disparity, batch["disparity"], self.losses.correct_within_px
         ) + masked_gradient_l1(gradient, batch["gradient"], self.losses.gradient_threshold_px)
