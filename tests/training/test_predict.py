@@ -107,6 +107,11 @@ class PlaneOracle(nn.Module):
 class SlopeOracle(PlaneOracle):
     """Stands for a GradNet: the slopes of that plane in pixels of the input it gets."""
 
+    def inputs(self, left: Tensor, right: Tensor, features: Tensor, disparity: Tensor) -> tuple[Tensor, ...]:
+        assert right.shape == left.shape
+        assert disparity.shape == (1, 1, *left.shape[-2:])
+        return left, features
+
     def forward(self, left: Tensor, features: Tensor) -> Tensor:  # type: ignore[override]  # noqa: ARG002
         stretch_x, stretch_y = self.stretch(left)
         _, b, c = self.plane
