@@ -92,14 +92,24 @@ def random_pair(rng: np.random.Generator, height: int, width: int, boxes: int = 
 
 
 def write_dataset(
-    root: Path, seed: int, train: int = 4, val: int = 0, height: int = 64, width: int = 128
+    root: Path,
+    seed: int,
+    train: int = 4,
+    val: int = 0,
+    height: int = 64,
+    width: int = 128,
+    unknown_rows: int = 0,
 ) -> Path:
-    """A data set in the native layout, as much of it as training reads: one frame a scene."""
+    """A data set in the native layout, as much of it as training reads: one frame a scene. The left truth of training
+    scene n lacks its first n times `unknown_rows` rows."""
     layout = Layout(root)
     rng = np.random.default_rng(seed)
     for split, count in (("train", train), ("val", val)):
         for scene in range(count):
-            _write_scene(layout, split, scene, random_pair(rng, height, width))
+            pair = random_pair(rng, height, width)
+            if split == "train":
+                pair.disparity_left[: scene * unknown_rows] = np.nan
+            _write_scene(layout, split, scene, pair)
     layout.recipe.write_text("family: synthetic\n")
     return root
 
