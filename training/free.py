@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from matching import SGBMParameters, fill_background, left_right_consistency, match_both
+from training.networks.evidence import RESIDUAL_CEILING_PX, limited_slopes
 
 Float32 = NDArray[np.float32]
 
@@ -22,9 +23,6 @@ FREE_FEATURES = 6
 """Channels of `disparity_features`."""
 CONFIRMED_WITHIN_PX = 1.0
 """A left-right difference up to this confirms a pixel."""
-SLOPE_CEILING_PX = 4.0
-"""Larger differences between neighbours are edges and tell no more than this does."""
-RESIDUAL_CEILING_PX = 8.0
 RESIDUAL_WINDOW_PX = 9
 
 
@@ -47,13 +45,10 @@ def disparity_features(disparity: Tensor, known: Tensor, consistency: Tensor) ->
     """(B, 6, H, W): disparity, whether it is known, whether the right view confirms it, its forward differences, and
     how far it is from its surroundings' mean; all but the first bounded. Arguments as in `FreeInputs`."""
     confirmed = ((consistency >= 0) & (consistency <= CONFIRMED_WITHIN_PX)).to(disparity.dtype)
-    along_x = F.pad(disparity[..., :, 1:] - disparity[..., :, :-1], (0, 1, 0, 0))
-    along_y = F.pad(disparity[..., 1:, :] - disparity[..., :-1, :], (0, 0, 0, 1))
     reach = RESIDUAL_WINDOW_PX // 2
     mean = F.avg_pool2d(disparity, RESIDUAL_WINDOW_PX, 1, reach, count_include_pad=False)
     residual = (disparity - mean).clamp(-RESIDUAL_CEILING_PX, RESIDUAL_CEILING_PX)
-    slopes = torch.cat([along_x, along_y], dim=1).clamp(-SLOPE_CEILING_PX, SLOPE_CEILING_PX)
-    return torch.cat([disparity, known, confirmed, slopes, residual], dim=1)
+    return torch.cat([disparity, known, confirmed, limited_slopes(disparity), residual], dim=1)
 
 
 def as_free_inputs(disparity: Float32, disparity_right: Float32) -> FreeInputs:

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from training.networks import ConfNet, DispNetCorr1D, GradNet, full_resolution, left_right_consistency
 from training.networks.dispnet import STRIDE
+from training.networks.evidence import Evidence
 
 
 class Regression(NamedTuple):
@@ -19,6 +20,15 @@ class Regression(NamedTuple):
     """(B, 1, H, W) px of the input, not negative."""
     features: Tensor
     """(B, F, H/2, W/2) matching features."""
+
+
+class HeadInputs(NamedTuple):
+    """What ConfNet and GradNet see of a batch; empty where there is no such network."""
+
+    regression: Regression
+    """What they are about."""
+    confnet: tuple[Tensor, ...]
+    gradnet: tuple[Tensor, ...]
 
 
 class Estimate(NamedTuple):
@@ -51,12 +61,20 @@ def regress_consistently(regressor: DispNetCorr1D, left: Tensor, right: Tensor) 
     return Regression(disparity_left, both.features[:batch]), consistency
 
 
-def confnet_inputs(
-    regressor: DispNetCorr1D, confnet: ConfNet, left: Tensor, right: Tensor
-) -> tuple[tuple[Tensor, ...], Regression]:
-    """What a ConfNet takes of images whose sides are multiples of 64, and the regression that it judges."""
-    regression, consistency = regress_consistently(regressor, left, right)
-    return confnet.inputs(left, right, regression.features, regression.disparity, consistency), regression
+def head_inputs(
+    regressor: DispNetCorr1D, confnet: ConfNet | None, gradnet: GradNet | None, left: Tensor, right: Tensor
+) -> HeadInputs:
+    """What the heads that there are take of images whose sides are multiples of 64; the regressor runs once."""
+    for_confnet: tuple[Tensor, ...] = ()
+    if confnet is None:
+        regression = regress(regressor, left, right)
+        evidence = Evidence(left, right, regression.disparity)
+    else:
+        regression, consistency = regress_consistently(regressor, left, right)
+        evidence = Evidence(left, right, regression.disparity)
+        for_confnet = confnet.inputs(regression.features, consistency, evidence)
+    for_gradnet = () if gradnet is None else gradnet.inputs(regression.features, evidence)
+    return HeadInputs(regression, for_confnet, for_gradnet)
 
 
 def network_size(height: int, width: int) -> tuple[int, int]:
@@ -81,17 +99,14 @@ def estimate(
     left, right = (resize(view, inner_height, inner_width) for view in (left, right))
     stretch_x, stretch_y = inner_width / width, inner_height / height
 
+    seen = head_inputs(regressor, confnet, gradnet, left, right)
     confidence = gradient = None
-    if confnet is None:
-        regression = regress(regressor, left, right)
-    else:
-        inputs, regression = confnet_inputs(regressor, confnet, left, right)
-        confidence = resize(confnet.confidence(*inputs), height, width)
+    if confnet is not None:
+        confidence = resize(confnet.confidence(*seen.confnet), height, width)
     if gradnet is not None:
-        seen = gradnet.inputs(left, right, regression.features, regression.disparity)
-        gradient = resize(gradnet(*seen), height, width)
+        gradient = resize(gradnet(*seen.gradnet), height, width)
         gradient = gradient * gradient.new_tensor([1.0, stretch_y / stretch_x]).view(1, 2, 1, 1)
-    return Estimate(resize(regression.disparity, height, width) / stretch_x, confidence, gradient)
+    return Estimate(resize(seen.regression.disparity, height, width) / stretch_x, confidence, gradient)
 
 
 def resize(maps: Tensor, height: int, width: int) -> Tensor:

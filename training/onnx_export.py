@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from storage import replacing
 from training.errors import TrainingError
-from training.inference import confnet_inputs, network_size, regress
+from training.inference import head_inputs, network_size
 from training.networks import ConfNet, Correlation1D, DispNetCorr1D, GradNet
 from training.predict import StereoPredictor
 
@@ -65,15 +65,12 @@ class ExportedNetworks(nn.Module):
 
     def forward(self, left: Tensor, right: Tensor) -> tuple[Tensor, ...]:
         """disparity (B, 1, H, W) px; confidence (B, 1, H, W); gradient (B, 2, H, W) [dx, dy]."""
-        if self.confnet is None:
-            regression = regress(self.regressor, left, right)
-            answers = [regression.disparity]
-        else:
-            inputs, regression = confnet_inputs(self.regressor, self.confnet, left, right)
-            answers = [regression.disparity, self.confnet.confidence(*inputs)]
+        seen = head_inputs(self.regressor, self.confnet, self.gradnet, left, right)
+        answers = [seen.regression.disparity]
+        if self.confnet is not None:
+            answers.append(self.confnet.confidence(*seen.confnet))
         if self.gradnet is not None:
-            seen = self.gradnet.inputs(left, right, regression.features, regression.disparity)
-            answers.append(self.gradnet(*seen))
+            answers.append(self.gradnet(*seen.gradnet))
         return tuple(answers)
 
 

@@ -14,6 +14,7 @@ from training.errors import TrainingError
 from training.free import FreeInputs, as_free_inputs
 from training.inference import estimate
 from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.networks.evidence import Evidence
 from training.weights import has_weights, load_confnet, load_gradnet, load_regressor, on_regressor
 
 
@@ -138,12 +139,13 @@ class FreePredictor:
                 )
         inputs = FreeInputs(*(maps.to(self._device) for maps in as_free_inputs(disparity, disparity_right)))
         image, other = (_as_tensor(view, self._device) for view in (left, right))
+        evidence = Evidence(image, other, inputs.disparity)
         confidence = gradient = None
         if self._confnet is not None:
-            seen = self._confnet.inputs(image, other, inputs.features, inputs.disparity, inputs.consistency)
+            seen = self._confnet.inputs(inputs.features, inputs.consistency, evidence)
             confidence = _as_array(self._confnet.confidence(*seen))[..., 0]
         if self._gradnet is not None:
-            seen = self._gradnet.inputs(image, other, inputs.features, inputs.disparity)
+            seen = self._gradnet.inputs(inputs.features, evidence)
             gradient = _as_array(self._gradnet(*seen))
         return Prediction(_as_array(inputs.disparity)[..., 0], confidence, gradient)
 

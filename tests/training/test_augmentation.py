@@ -42,7 +42,7 @@ def warp_error(sample: TrainingSample) -> float:
     height, width = sample.disparity.shape
     columns = np.arange(width) + 0.5 - sample.disparity
     inside = (columns > 1) & (columns < width - 1)
-    assert inside.mean() > 0.1
+    assert inside.mean() > 0.2
     errors = []
     for y in range(height):
         for channel in range(3):
@@ -52,18 +52,23 @@ def warp_error(sample: TrainingSample) -> float:
 
 
 @settings(max_examples=25, deadline=None)
-@given(
-    seed=st.integers(0, 10_000),
-    flip=st.booleans(),
-    upside_down=st.booleans(),
-    shear=st.sampled_from([0.0, 0.5]),
-)
+@given(seed=st.integers(0, 10_000), flip=st.booleans(), upside_down=st.booleans())
 def test_right_image_warped_by_the_disparity_is_the_left_one(
-    seed: int, flip: bool, upside_down: bool, shear: float
+    seed: int, flip: bool, upside_down: bool
 ) -> None:
-    config = replace(GEOMETRY, horizontal_flip=float(flip), vertical_flip=float(upside_down), shear=shear)
+    config = replace(GEOMETRY, horizontal_flip=float(flip), vertical_flip=float(upside_down))
     pair = slanted_plane(seed)
-    sample = augment(np.random.default_rng(seed), pair, (64, 96), config)
+    check_warp(augment(np.random.default_rng(seed), pair, (64, 96), config))
+
+
+@pytest.mark.parametrize("shear", [0.3, -0.3])
+@pytest.mark.parametrize("seed", range(8))
+def test_sheared_right_image_warped_by_the_disparity_is_the_left_one(seed: int, shear: float) -> None:
+    window = Window(20.5, 10.25, 1.2, 1.1)
+    check_warp(cut(slanted_plane(seed), window, (64, 128), (IDENTITY_CURVE, IDENTITY_CURVE), shear))
+
+
+def check_warp(sample: TrainingSample) -> None:
     assert (sample.disparity >= 0).all()
     # What remains at the right disparity is 8-bit rounding; half a pixel more or less must show.
     error = warp_error(sample)

@@ -23,6 +23,7 @@ from training.networks.evidence import (
     COST_OFFSETS_PX,
     EVIDENCE_CHANNELS,
     SLOPE_CHANNELS,
+    Evidence,
     smooth_slopes,
 )
 
@@ -63,15 +64,26 @@ def test_confnet_sees_evidence_where_configured() -> None:
     config = HeadConfig(feature_channels=5, width=4, hidden=4, evidence=True)
     network = ConfNet(config).eval()
     left, right, other = torch.rand(3, 1, 3, 32, 64)
-    maps = (torch.rand(1, 5, 16, 32), torch.rand(1, 1, 32, 64) * 9, torch.rand(1, 1, 32, 64))
-    joined, changed = (network.joined_input(*network.inputs(left, view, *maps)) for view in (right, other))
+    features, disparity, consistency = (
+        torch.rand(1, 5, 16, 32),
+        torch.rand(1, 1, 32, 64) * 9,
+        torch.rand(1, 1, 32, 64),
+    )
+    seen, seen_otherwise = (
+        network.inputs(features, consistency, Evidence(left, view, disparity)) for view in (right, other)
+    )
+    joined, changed = network.joined_input(*seen), network.joined_input(*seen_otherwise)
     plain = ConfNet(replace(config, evidence=False))
-    assert plain.inputs(left, right, *maps) == (left, maps[0], maps[2])
-    torch.testing.assert_close(joined[:, :9], plain.joined_input(*plain.inputs(left, right, *maps)))
+    assert plain.inputs(features, consistency, Evidence(left, right, disparity)) == (
+        left,
+        features,
+        consistency,
+    )
+    torch.testing.assert_close(joined[:, :9], plain.joined_input(left, features, consistency))
     assert joined.shape == (1, 9 + EVIDENCE_CHANNELS, 32, 64)
     differs = (joined != changed).flatten(2).any(2)[0]
     assert differs.nonzero().flatten().tolist() == list(range(9, 9 + len(COST_OFFSETS_PX)))
-    assert network.confidence(*network.inputs(left, right, *maps)).shape == (1, 1, 32, 64)
+    assert network.confidence(*seen).shape == (1, 1, 32, 64)
 
 
 def test_gradnet_sees_evidence_where_configured() -> None:
@@ -80,12 +92,13 @@ def test_gradnet_sees_evidence_where_configured() -> None:
     left, right = torch.rand(2, 1, 3, 32, 64)
     features, disparity = torch.rand(1, 5, 16, 32), torch.rand(1, 1, 32, 64) * 9
     network, plain = GradNet(config), GradNet(replace(config, evidence=False))
-    assert plain.inputs(left, right, features, disparity) == (left, features)
-    joined = network.joined_input(*network.inputs(left, right, features, disparity))
+    evidence = Evidence(left, right, disparity)
+    assert plain.inputs(features, evidence) == (left, features)
+    joined = network.joined_input(*network.inputs(features, evidence))
     assert joined.shape == (1, 8 + EVIDENCE_CHANNELS + SLOPE_CHANNELS, 32, 64)
     torch.testing.assert_close(joined[:, :8], plain.joined_input(left, features))
     torch.testing.assert_close(joined[:, -SLOPE_CHANNELS:], smooth_slopes(disparity))
-    assert network(*network.inputs(left, right, features, disparity)).shape == (1, 2, 32, 64)
+    assert network(*network.inputs(features, evidence)).shape == (1, 2, 32, 64)
 
 
 def test_inputs_are_standardized_with_fixed_numbers() -> None:

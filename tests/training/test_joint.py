@@ -23,11 +23,11 @@ from tests.training.synthetic import write_dataset
 from training.augmentation import NO_AUGMENTATION
 from training.data import Batch
 from training.errors import TrainingError
+from training.inference import HeadInputs, Regression
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
 from training.predict import StereoPredictor
 from training.presets import JointPreset, Preset, RegressorPreset, find_preset
 from training.tasks import JointHeads, JointTask, StereoTask
-from training.tasks.joint import JointInputs
 from training.train import train
 from training.weights import read_summary
 
@@ -43,9 +43,11 @@ class GivenTask(JointTask):
         heads = JointHeads(ConfNet(HEAD), GradNet(HEAD))
         super().__init__(preset, DispNetCorr1D(DispNetConfig(width=0.0625)), heads, refinement, 1, 0)
 
-    def inputs(self, batch: Batch) -> JointInputs:
+    def inputs(self, batch: Batch) -> HeadInputs:
         seen = batch["left"], batch["features"]
-        return JointInputs((*seen, batch["consistency"]), seen, batch["initial"])
+        return HeadInputs(
+            Regression(batch["initial"], batch["features"]), (*seen, batch["consistency"]), seen
+        )
 
 
 def given_batch(samples: int = 2) -> Batch:
@@ -77,7 +79,7 @@ def joint(**changes: object) -> JointPreset:
 
 
 def refined(task: JointTask, batch: Batch) -> Tensor:
-    confnet_sees, gradnet_sees, disparity = task.inputs(batch)
+    (disparity, _), confnet_sees, gradnet_sees = task.inputs(batch)
     logits, gradient = task.network.confnet(*confnet_sees), task.network.gradnet(*gradnet_sees)
     return task.refine(batch["left"], disparity, logits, gradient)
 
@@ -88,7 +90,7 @@ def test_refines_as_the_method_does(form: str) -> None:
     ours = Ours(MRFParameters(30.0, 1.0, 4.0), ConfidenceShape(0.7, 2.0), form=form)  # type: ignore[arg-type]
     task, batch = GivenTask(joint(tolerance=1e-7), ours), given_batch(1)
     batch["left"] = (batch["left"] * 255).round() / 255
-    confnet_sees, gradnet_sees, disparity = task.inputs(batch)
+    (disparity, _), confnet_sees, gradnet_sees = task.inputs(batch)
     with torch.no_grad():
         got = refined(task, batch)[0, 0]
         confidence = task.network.confnet.confidence(*confnet_sees)[0, 0].numpy()

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from training.errors import TrainingError
 from training.inference import estimate
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, DispNetOutput, GradNet, HeadConfig
+from training.networks.evidence import Evidence
 from training.predict import StereoPredictor
 from training.weights import TrainingSummary, load_gradnet, load_regressor, read_summary, save_weights
 
@@ -107,10 +108,10 @@ class PlaneOracle(nn.Module):
 class SlopeOracle(PlaneOracle):
     """Stands for a GradNet: the slopes of that plane in pixels of the input it gets."""
 
-    def inputs(self, left: Tensor, right: Tensor, features: Tensor, disparity: Tensor) -> tuple[Tensor, ...]:
-        assert right.shape == left.shape
-        assert disparity.shape == (1, 1, *left.shape[-2:])
-        return left, features
+    def inputs(self, features: Tensor, evidence: Evidence) -> tuple[Tensor, ...]:
+        assert evidence.right.shape == evidence.left.shape
+        assert evidence.disparity.shape == (1, 1, *evidence.left.shape[-2:])
+        return evidence.left, features
 
     def forward(self, left: Tensor, features: Tensor) -> Tensor:  # type: ignore[override]  # noqa: ARG002
         stretch_x, stretch_y = self.stretch(left)

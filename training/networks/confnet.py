@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from training.networks.evidence import EVIDENCE_CHANNELS, disparity_evidence
+from training.networks.evidence import EVIDENCE_CHANNELS, Evidence
 from training.networks.heads import HeadConfig, PixelHead
 
 LRC_CEILING_PX = 20.0
@@ -21,12 +21,10 @@ class ConfNet(PixelHead):
         extra_channels = 1 + (EVIDENCE_CHANNELS if config.evidence else 0)
         super().__init__(config, extra_channels, outputs=2, activation="relu")
 
-    def inputs(
-        self, left: Tensor, right: Tensor, features: Tensor, disparity: Tensor, consistency: Tensor
-    ) -> tuple[Tensor, ...]:
-        """What `forward` takes, of a pair (B, 3, H, W) in 0..1 and what a predictor says about it."""
-        evidence = (disparity_evidence(left, right, disparity),) if self.config.evidence else ()
-        return left, features, consistency, *evidence
+    def inputs(self, features: Tensor, consistency: Tensor, evidence: Evidence) -> tuple[Tensor, ...]:
+        """What `forward` takes, of a pair and what a predictor says about it."""
+        published = evidence.left, features, consistency
+        return (*published, evidence.maps) if self.config.evidence else published
 
     def joined_input(self, *inputs: Tensor) -> Tensor:
         image, features, consistency, *evidence = inputs

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
@@ -27,6 +29,28 @@ SLOPE_CHANNELS = 2 * len(SLOPE_WINDOWS_PX)
 """Channels of `smooth_slopes`."""
 
 
+class Evidence:
+    """What a pair and a disparity of its left view say: worked out when a network asks, once for all that do.
+
+    Args:
+        left, right: (B, 3, H, W) in 0..1.
+        disparity: (B, 1, H, W) px, finite.
+    """
+
+    def __init__(self, left: Tensor, right: Tensor, disparity: Tensor) -> None:
+        self.left, self.right, self.disparity = left, right, disparity
+
+    @cached_property
+    def maps(self) -> Tensor:
+        """`disparity_evidence`."""
+        return disparity_evidence(self.left, self.right, self.disparity)
+
+    @cached_property
+    def slopes(self) -> Tensor:
+        """`smooth_slopes`."""
+        return smooth_slopes(self.disparity)
+
+
 def disparity_evidence(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
     """Matching costs around a disparity, its slopes, its distance to its surroundings and their roughness, its place.
 
@@ -42,7 +66,7 @@ def disparity_evidence(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor
     return torch.cat(
         [
             matching_costs(left, right, disparity),
-            _slopes(disparity),
+            limited_slopes(disparity),
             *(map_ for window in RESIDUAL_WINDOWS_PX for map_ in _surroundings(disparity, window)),
             places.clamp(-LEFT_BORDER_CAP_PX, LEFT_BORDER_CAP_PX),
         ],
@@ -89,7 +113,8 @@ def smooth_slopes(disparity: Tensor) -> Tensor:
     return torch.cat([mean[:, :2] / mean[:, 2:].clamp(min=1e-6) for mean in means], dim=1)
 
 
-def _slopes(disparity: Tensor) -> Tensor:
+def limited_slopes(disparity: Tensor) -> Tensor:
+    """Forward differences [dx, dy] of (B, 1, H, W), within `SLOPE_CEILING_PX`; 0 in the last column and row."""
     return _differences(disparity).clamp(-SLOPE_CEILING_PX, SLOPE_CEILING_PX)
 
 

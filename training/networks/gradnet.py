@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from training.networks.evidence import (
-    EVIDENCE_CHANNELS,
-    SLOPE_CHANNELS,
-    disparity_evidence,
-    smooth_slopes,
-)
+from training.networks.evidence import EVIDENCE_CHANNELS, SLOPE_CHANNELS, Evidence
 from training.networks.heads import HeadConfig, PixelHead
 
 PUBLISHED_GRADNET = HeadConfig(dropout=0.2)
@@ -24,8 +19,7 @@ class GradNet(PixelHead):
         extra_channels = EVIDENCE_CHANNELS + SLOPE_CHANNELS if config.evidence else 0
         super().__init__(config, extra_channels, outputs=2, activation="leaky_relu")
 
-    def inputs(self, left: Tensor, right: Tensor, features: Tensor, disparity: Tensor) -> tuple[Tensor, ...]:
-        """What `forward` takes, of a pair (B, 3, H, W) in 0..1 and what a predictor says about it."""
-        if not self.config.evidence:
-            return left, features
-        return left, features, disparity_evidence(left, right, disparity), smooth_slopes(disparity)
+    def inputs(self, features: Tensor, evidence: Evidence) -> tuple[Tensor, ...]:
+        """What `forward` takes, of a pair and what a predictor says about it."""
+        published = evidence.left, features
+        return (*published, evidence.maps, evidence.slopes) if self.config.evidence else published

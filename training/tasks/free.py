@@ -16,6 +16,7 @@ from training.metrics import (
     sparsification_auc,
 )
 from training.networks import ConfNet, GradNet
+from training.networks.evidence import Evidence
 from training.presets import FreeConfNetPreset, FreeGradNetPreset
 from training.tasks.base import StereoTask, image_of, map_of
 from viewing import Picture, confidence_picture, error_picture, gradient_picture, side_by_side
@@ -38,9 +39,8 @@ class FreeConfNetTask(StereoTask):
         with torch.no_grad():
             left, right = batch["left"], batch["right"]
             matched = match_batch(left, right, self.matcher)
-            inputs = self.network.inputs(
-                left, right, matched.features, matched.disparity, matched.consistency
-            )
+            evidence = Evidence(left, right, matched.disparity)
+            inputs = self.network.inputs(matched.features, matched.consistency, evidence)
         return inputs, matched.disparity
 
     def loss(self, batch: Batch) -> Tensor:
@@ -90,7 +90,7 @@ class FreeGradNetTask(StereoTask):
         with torch.no_grad():
             left, right = batch["left"], batch["right"]
             matched = match_batch(left, right, self.matcher)
-            inputs = self.network.inputs(left, right, matched.features, matched.disparity)
+            inputs = self.network.inputs(matched.features, Evidence(left, right, matched.disparity))
         return inputs, matched.disparity
 
     def loss(self, batch: Batch) -> Tensor:

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from training.data import Batch
-from training.inference import confnet_inputs, estimate, regress
+from training.inference import estimate, head_inputs
 from training.losses import confidence_cross_entropy, masked_gradient_l1
 from training.metrics import (
     bad_rate,
@@ -52,8 +52,8 @@ class ConfNetTask(HeadTask):
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
         """What the network sees, from the regressor run once; and the disparity it is about."""
         with torch.no_grad():
-            inputs, regression = confnet_inputs(self.regressor, self.network, batch["left"], batch["right"])
-        return inputs, regression.disparity
+            seen = head_inputs(self.regressor, self.network, None, batch["left"], batch["right"])
+        return seen.confnet, seen.regression.disparity
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, disparity = self.head_inputs(batch)
@@ -102,10 +102,8 @@ class GradNetTask(HeadTask):
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
         """What the network sees, from the regressor run once; and the disparity it is about."""
         with torch.no_grad():
-            left, right = batch["left"], batch["right"]
-            regression = regress(self.regressor, left, right)
-            inputs = self.network.inputs(left, right, regression.features, regression.disparity)
-        return inputs, regression.disparity
+            seen = head_inputs(self.regressor, None, self.network, batch["left"], batch["right"])
+        return seen.gradnet, seen.regression.disparity
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, _ = self.head_inputs(batch)

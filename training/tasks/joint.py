@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
@@ -11,7 +9,7 @@ from torch import Tensor, nn
 from refine.baselines.ours import Ours
 from refine.differentiable import image_weights, refine_batch
 from training.data import Batch
-from training.inference import confnet_inputs, estimate
+from training.inference import HeadInputs, estimate, head_inputs
 from training.losses import confidence_cross_entropy, masked_gradient_l1, refinement_l1
 from training.metrics import (
     bad_rate,
@@ -43,15 +41,6 @@ class JointHeads(nn.Module):
         self.gradnet = gradnet
 
 
-class JointInputs(NamedTuple):
-    """What ConfNet and GradNet see of a batch."""
-
-    confnet: tuple[Tensor, ...]
-    gradnet: tuple[Tensor, ...]
-    disparity: Tensor
-    """(B, 1, H, W) px, which they are about."""
-
-
 class JointTask(HeadTask):
     """L1 of the refined disparity and of its gradient, and a share of what the heads learned from before.
 
@@ -76,13 +65,11 @@ class JointTask(HeadTask):
         self.refinement = refinement
         self.losses = preset
 
-    def inputs(self, batch: Batch) -> JointInputs:
+    def inputs(self, batch: Batch) -> HeadInputs:
         """What the two networks see, from the regressor run once."""
-        left, right = batch["left"], batch["right"]
+        heads = self.network
         with torch.no_grad():
-            confnet, regression = confnet_inputs(self.regressor, self.network.confnet, left, right)
-            gradnet = self.network.gradnet.inputs(left, right, regression.features, regression.disparity)
-        return JointInputs(confnet, gradnet, regression.disparity)
+            return head_inputs(self.regressor, heads.confnet, heads.gradnet, batch["left"], batch["right"])
 
     def refine(self, image: Tensor, disparity: Tensor, logits: Tensor, gradient: Tensor) -> Tensor:
         """The refined disparity (B, 1, H, W), differentiable in ConfNet's logits and GradNet's gradient."""
@@ -100,8 +87,9 @@ class JointTask(HeadTask):
         )[:, None]
 
     def loss(self, batch: Batch) -> Tensor:
-        confnet_sees, gradnet_sees, disparity = self.inputs(batch)
-        logits, gradient = self.network.confnet(*confnet_sees), self.network.gradnet(*gradnet_sees)
+        seen = self.inputs(batch)
+        disparity = seen.regression.disparity
+        logits, gradient = self.network.confnet(*seen.confnet), self.network.gradnet(*seen.gradnet)
         own = confidence_cross_entropy(
             logits, disparity, batch["disparity"], self.losses.correct_within_px
         ) + masked_gradient_l1(gradient, batch["gradient"], self.losses.gradient_threshold_px)
