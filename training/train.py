@@ -125,6 +125,10 @@ def train(
     if steps < 1:
         raise TrainingError(f"a run needs at least one step, got {steps}")
     hardware = trainer_options(device, precision)
+    sources, held_out = open_sources(data, (preset.crop_height, preset.crop_width), validation)
+    if pseudo is not None:
+        sources = [_with_pseudo_truth(sources, pseudo)]
+        preset_name += f", truth from {pseudo}"
     out.mkdir(parents=True, exist_ok=True)
     logs = out / "logs" / task
     if isinstance(preset, JointPreset):
@@ -147,10 +151,6 @@ def train(
             "refinement": None if refinement is None else asdict(refinement),
         },
     )
-    sources, held_out = open_sources(data, (preset.crop_height, preset.crop_width), validation)
-    if pseudo is not None:
-        sources = [_with_pseudo_truth(sources, pseudo)]
-        preset_name += f", truth from {pseudo}"
     module = StereoDataModule(sources, held_out, preset, steps, seed, workers, cache_bytes)
     summary = TrainingSummary(
         preset_name,

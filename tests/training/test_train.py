@@ -324,6 +324,7 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
         train("regressor", source, tmp_path / "crop", "tiny")
     with pytest.raises(DatasetError, match="no such folder"):
         train("regressor", [(tmp_path / "nowhere", 1.0)], tmp_path / "x", "tiny")
+    assert not (tmp_path / "x").exists()
 
 
 def test_another_regressor_is_not_overwritten(data: Path, run: Path, tmp_path: Path) -> None:
