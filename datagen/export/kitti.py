@@ -2,7 +2,7 @@
 
     training/image_2/000000_10.png       left image            training/image_3/...   right image
     training/disp_occ_0/000000_10.png    all pixels            training/disp_noc_0/... those the other eye sees
-    training/obj_map/000000_10.png       0 background, else an object's number
+    training/obj_map/000000_10.png       0 background, else a vehicle's number (KITTI's foreground is its cars)
     training/calib_cam_to_cam/000000.txt projections of both cameras
 
 Disparity is 16-bit PNG, 256 times the pixels; 0 is invalid, which the sky therefore is.
@@ -18,13 +18,16 @@ from numpy.typing import NDArray
 from datagen.dataset import StereoDataset, StereoSample
 from datagen.export.lidar import lidar_mask
 from datagen.formats import write_png
+from scenes.shapes.vehicles import VEHICLE_PARTS
+from scenes.spec import Scene
+from scenes.streets.traffic import vehicle_of
 from storage import Tree
 
 FOLDERS = {"train": "training", "val": "validation", "test": "testing"}
 """KITTI has no validation set and keeps the ground truth of its testing set to itself; here all have it."""
 SCALE = 256.0
-OBJECT_NUMBERS = 255
-"""An object map is 8-bit: after so many the numbers begin again at 1, so that no object becomes background."""
+VEHICLE_NUMBERS = 255
+"""An object map is 8-bit: after so many the numbers begin again at 1, so that no vehicle becomes background."""
 
 
 def export_kitti(
@@ -53,18 +56,32 @@ def encode_disparity(disparity: NDArray[np.float32], keep: NDArray[np.bool_]) ->
     return np.where(storable, np.maximum(scaled, 1), 0).astype(np.uint16)
 
 
+def vehicle_numbers(scene: Scene) -> NDArray[np.uint8]:
+    """(objects + 1,) the number in an object map of every object index, 0 for what is no part of a vehicle.
+
+    Body, glass, lamps and wheels of one vehicle share a number.
+    """
+    numbers = np.zeros(len(scene.objects) + 1, np.uint8)
+    seen: dict[str, int] = {}
+    for index, thing in enumerate(scene.objects, start=1):
+        if isinstance(thing.shape, VEHICLE_PARTS):
+            vehicle = seen.setdefault(vehicle_of(thing.name), len(seen))
+            numbers[index] = vehicle % VEHICLE_NUMBERS + 1
+    return numbers
+
+
 def _write_frame(out: Tree, folder: str, number: int, sample: StereoSample, lidar_beams: int | None) -> None:
-    camera = sample.scene_record.camera
+    scene = sample.scene_record
+    camera = scene.camera
     measured = np.ones(sample.size, bool)
     if lidar_beams is not None:
         measured = lidar_mask(*sample.size, camera.focal_px, lidar_beams)
-    numbers = sample.object_index_left
     images: dict[str, NDArray[np.uint8] | NDArray[np.uint16]] = {
         "image_2": sample.left,
         "image_3": sample.right,
         "disp_occ_0": encode_disparity(sample.disparity_left, measured),
         "disp_noc_0": encode_disparity(sample.disparity_left, measured & (sample.occlusion_left == 0)),
-        "obj_map": np.where(numbers > 0, (numbers - 1) % OBJECT_NUMBERS + 1, 0).astype(np.uint8),
+        "obj_map": vehicle_numbers(scene)[sample.object_index_left],
     }
     for kind, image in images.items():
         with out.writing(f"{folder}/{kind}/{number:06d}_10.png") as path:

@@ -653,3 +653,11 @@ class WheelSet(MetricShape):
         vertices, triangles = joined(*((one.vertices + hub, one.triangles) for hub in hubs))
         assert one.uv is not None
         return Surface(vertices, triangles, np.tile(one.uv, (len(hubs), 1, 1)))
+
+
+VEHICLE_PARTS = (
+    *(CarBody, CarGlass, CarTrim, CarLamps),
+    *(VanBody, CargoBox, VanGlass, VanTrim, VanLamps),
+    *(Wheel, WheelSet),
+)
+"""What makes an object a part of a vehicle."""

@@ -156,6 +156,11 @@ def _livery(rng: np.random.Generator) -> Srgb:
     return shade(light, uniform(rng, 0.0, 0.16), uniform(rng, 0.0, 360.0))
 
 
+def vehicle_of(name: str) -> str:
+    """The vehicle a part's name speaks of: "parked L3 head lamps" is of "parked L3"."""
+    return " ".join(name.split()[:2])
+
+
 def _vehicle(
     rng: np.random.Generator,
     name: str,
@@ -166,7 +171,10 @@ def _vehicle(
     turn_deg: float,
     times: tuple[float, ...],
 ) -> tuple[SceneObject, ...]:
-    """A vehicle that stands at one place or passes through several at the given times."""
+    """A vehicle that stands at one place or passes through several at the given times.
+
+    Its `name` is two words, with which its parts' names begin.
+    """
     places = [course.place(s, t_m) for s in s_m]
     turns = [course.facing(s, turn_deg) for s in s_m]
     paint = model.paint(rng)

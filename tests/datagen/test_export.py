@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from pathlib import Path
 
 import cv2
@@ -13,11 +14,12 @@ import webdataset
 
 from datagen import DatasetError, StereoDataset
 from datagen.export import EXPORTERS, ExportOptions
-from datagen.export.kitti import encode_disparity
+from datagen.export.kitti import encode_disparity, vehicle_numbers
 from datagen.export.lidar import lidar_mask
 from datagen.layout import Layout
 from datagen.source import open_source
 from datagen.verify import verify_dataset
+from scenes import sample_scene
 from stereoforge.cli import main
 from storage import open_tree
 
@@ -54,7 +56,7 @@ def test_kitti(analytic_dataset: Path, tmp_path: Path) -> None:
         assert (visible[seen] == everywhere[seen]).all()
         objects = cv2.imread(str(tmp_path / "training/obj_map" / file), cv2.IMREAD_UNCHANGED)
         assert objects.dtype == np.uint8
-        assert (objects == sample.object_index_left).all()
+        assert (objects == 0).all()  # no vehicle
     lines = (tmp_path / "training/calib_cam_to_cam/000000.txt").read_text().splitlines()
     words = dict(line.split(": ") for line in lines)
     left, right = (np.array(words[f"P_rect_{k}"].split(), float).reshape(3, 4) for k in ("02", "03"))
@@ -64,6 +66,24 @@ def test_kitti(analytic_dataset: Path, tmp_path: Path) -> None:
     assert one[0] - two[0] == pytest.approx(camera.focal_px * camera.baseline_m / 4.0)
     assert one[1] == two[1]
     assert len(list((tmp_path / "testing/image_2").iterdir())) == 2
+
+
+def test_kitti_object_maps_number_vehicles() -> None:
+    """The oracle reads the Scene as text: class names and the words before a part's."""
+    scene = sample_scene(np.random.default_rng(3), "driving")
+    numbers = vehicle_numbers(scene)
+    assert numbers[0] == 0
+    vehicles: dict[str, set[int]] = {}
+    for thing, number in zip(scene.objects, numbers[1:], strict=True):
+        part = re.fullmatch(
+            r"((?:car|parked) [LR]?[0-9.]+) (body|box|glass|trim|head lamps|tail lamps|wheels?.*)", thing.name
+        )
+        assert (part is not None) == (number > 0), thing.name
+        if part is not None:
+            vehicles.setdefault(part[1], set()).add(int(number))
+    assert len(vehicles) > 10
+    assert all(len(own) == 1 for own in vehicles.values())
+    assert len(set.union(*vehicles.values())) == len(vehicles)
 
 
 def test_kitti_disparities_at_the_ends_of_what_it_can_store() -> None:
