@@ -292,22 +292,19 @@ def _prolong(ties, inverse, left, residual, x):
 
 
 @njit(cache=True, fastmath={"contract"})
+def _both(planes, k, x, y, j, dy, dx):
+    """What the couplings k ahead and behind of (y + 2, j + 2) bring. Written as `j + 2 - dx`: indices that might be
+    negative keep LLVM from vectorising."""
+    ahead = planes[k, y + 2, j + 2] * x[y + 2 + dy, j + 2 + dx]
+    return ahead + planes[k, y + 2 - dy, j + 2 - dx] * x[y + 2 - dy, j + 2 - dx]
+
+
+@njit(cache=True, fastmath={"contract"})
 def _coupled(planes, x, y, j):
-    """The sum over the couplings of (y, j)."""
-    return (
-        planes[0, y, j] * x[y, j + 1]
-        + planes[0, y, j - 1] * x[y, j - 1]
-        + planes[1, y, j] * x[y, j + 2]
-        + planes[1, y, j - 2] * x[y, j - 2]
-        + planes[2, y, j] * x[y + 1, j - 1]
-        + planes[2, y - 1, j + 1] * x[y - 1, j + 1]
-        + planes[3, y, j] * x[y + 1, j]
-        + planes[3, y - 1, j] * x[y - 1, j]
-        + planes[4, y, j] * x[y + 1, j + 1]
-        + planes[4, y - 1, j - 1] * x[y - 1, j - 1]
-        + planes[5, y, j] * x[y + 2, j]
-        + planes[5, y - 2, j] * x[y - 2, j]
-    )
+    """The sum over the couplings of (y + 2, j + 2)."""
+    total = _both(planes, 0, x, y, j, 0, 1) + _both(planes, 1, x, y, j, 0, 2)
+    total += _both(planes, 2, x, y, j, 1, -1) + _both(planes, 3, x, y, j, 1, 0)
+    return total + _both(planes, 4, x, y, j, 1, 1) + _both(planes, 5, x, y, j, 2, 0)
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
@@ -318,7 +315,7 @@ def _from_zero(planes, step, b, x, left):
             x[y + 2, j + 2] = step[y + 2, j + 2] * b[y + 2, j + 2]
     for y in prange(height):
         for j in range(width):
-            left[y + 2, j + 2] = (1 - DAMPING) * b[y + 2, j + 2] + _coupled(planes, x, y + 2, j + 2)
+            left[y + 2, j + 2] = (1 - DAMPING) * b[y + 2, j + 2] + _coupled(planes, x, y, j)
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
@@ -326,5 +323,5 @@ def _again(planes, step, b, x, out):
     height, width = step.shape[0] - 4, step.shape[1] - 4
     for y in prange(height):
         for j in range(width):
-            total = b[y + 2, j + 2] + _coupled(planes, x, y + 2, j + 2)
+            total = b[y + 2, j + 2] + _coupled(planes, x, y, j)
             out[y + 2, j + 2] = (1 - DAMPING) * x[y + 2, j + 2] + step[y + 2, j + 2] * total
