@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit, prange
 
-from refine.solvers.hierarchy import DAMPING, Hierarchy, build_hierarchy
+from refine.solvers.hierarchy import Hierarchy, build_hierarchy
 from refine.solvers.rows import Indices, Rows
 from refine.solvers.stencils import Couplings, Singles
+from refine.solvers.windows import DAMPING
 
 STRONGER = np.float32(3)
 """Times as strong as what it stands for, the coupling of a detour has to be."""
@@ -56,29 +57,31 @@ class Elimination:
 
 @dataclass(frozen=True)
 class GridSmoother:
-    """`refine.solvers.hierarchy.RowSmoother` for the pixels that are left, without indices."""
+    """`refine.solvers.hierarchy.Smoother` for the pixels that are left, without indices."""
 
     planes: Singles
     step: Singles
-    """(H, W) DAMPING / diagonal, 0 at pixels that are eliminated."""
+    """Flat, `DAMPING` / diagonal; 0 at pixels that are eliminated."""
 
     def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
-        shape = self.step.shape
-        _from_zero(self.planes, self.step, b.reshape(shape), x.reshape(shape), left.reshape(shape))
+        step, b, x, left = (vector.reshape(self.planes.shape[1:]) for vector in (self.step, b, x, left))
+        _from_zero(self.planes, step, b, x, left)
 
     def again(self, b: Singles, x: Singles, out: Singles) -> None:
-        shape = self.step.shape
-        _again(self.planes, self.step, b.reshape(shape), x.reshape(shape), out.reshape(shape))
+        step, b, x, out = (vector.reshape(self.planes.shape[1:]) for vector in (self.step, b, x, out))
+        _again(self.planes, step, b, x, out)
 
 
 def grid_hierarchy(elimination: Elimination, graph: Rows, excess: Singles) -> Hierarchy:
     """The hierarchy below the image for vectors that are padded images, flat."""
-    hierarchy = build_hierarchy(graph, excess)
-    number = elimination.number.ravel()
-    place = np.flatnonzero(number >= 0).astype(np.int32)
-    step = np.zeros_like(elimination.inverse)
-    step.ravel()[place] = hierarchy.levels[0].smoother.step
-    return hierarchy.embedded(place, number.size, GridSmoother(elimination.planes, step))
+
+    def arrange(graph: Rows, excess: Singles) -> tuple[GridSmoother, Indices]:
+        place = np.flatnonzero(elimination.number.ravel() >= 0).astype(np.int32)
+        step = np.zeros_like(elimination.inverse)
+        _invert(graph.start, graph.value, excess, place, step.ravel())
+        return GridSmoother(elimination.planes, step.ravel()), place
+
+    return build_hierarchy(graph, excess, arrange)
 
 
 def eliminate_black(parts: Couplings, color_scale: float) -> tuple[Elimination, Rows, Singles]:
@@ -250,6 +253,16 @@ def _list(planes, number, start, column, value):
                         column[at] = number[y + _AROUND[k, 0], x + _AROUND[k, 1]]
                         value[at] = strength
                         at += 1
+
+
+@njit(cache=True, parallel=True)
+def _invert(start, value, excess, place, step):
+    """DAMPING / diagonal."""
+    for i in prange(place.size):
+        held = np.float64(excess[i])
+        for e in range(start[i], start[i + 1]):
+            held += value[e]
+        step[place[i]] = DAMPING / np.float32(held) if held > 0 else 0
 
 
 @njit(cache=True)

@@ -19,3 +19,8 @@ class Rows:
     start: Indices
     column: Indices
     value: Singles
+
+
+def of(rows: Rows) -> tuple[Indices, Indices, Singles]:
+    """The arrays, for a kernel."""
+    return rows.start, rows.column, rows.value

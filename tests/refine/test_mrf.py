@@ -6,11 +6,13 @@ import warnings
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from refine import ConvergenceWarning, MRFParameters, SolverError, refine_disparity, solve_mrf
 from refine.metrics import forward_gradient
+from refine.solvers.rows import Rows
 from refine.weights import NEIGHBORS
 from tests.refine.oracles import dense_minimiser, dense_paper_solution
 from tests.refine.worlds import Problem, random_problem, toy_frame
@@ -362,10 +364,121 @@ def test_the_first_level_is_smoothed_alike_as_an_image_and_by_rows(style):
     elimination, graph, excess = eliminate_black(couplings_of(checked), 0.5)
     place = elimination.number.ravel() >= 0
     right_hand_side = np.random.default_rng(0).normal(size=place.size).astype(np.float32)
-    expected = build_hierarchy(graph, excess).correct(right_hand_side[place])
+    by_rows = build_hierarchy(graph, excess)
+    arranged = np.empty(excess.size, np.float32)
+    arranged[by_rows.position] = right_hand_side[place]
+    expected = by_rows.correct(arranged)[by_rows.position]
     found = grid_hierarchy(elimination, graph, excess).correct(right_hand_side)
-    np.testing.assert_allclose(found[place], expected, rtol=1e-4, atol=1e-6)
+    # Couplings by windows are rounded to 8 bits.
+    np.testing.assert_allclose(found[place], expected, rtol=0, atol=0.01 * np.abs(expected).max())
     assert not found[~place].any()
+
+
+def random_graph(size, reach, seed):
+    """Couplings between unknowns no further apart than that, by rows, and an excess."""
+    rng = np.random.default_rng(seed)
+    ends = rng.integers(0, size, (3 * size, 2))
+    ends[:, 1] = np.clip(ends[:, 0] + rng.integers(-reach, reach + 1, 3 * size), 0, size - 1)
+    ends = ends[ends[:, 0] != ends[:, 1]]
+    couplings = sp.coo_array((rng.lognormal(0, 3, len(ends)), ends.T), shape=(size, size))
+    couplings = sp.csr_array(couplings + couplings.T)
+    rows = Rows(couplings.indptr, couplings.indices, couplings.data.astype(np.float32))
+    return rows, rng.uniform(0, 1, size).astype(np.float32)
+
+
+@pytest.mark.parametrize(("size", "reach"), [(1, 1), (511, 40), (1300, 1300), (90_000, 70_000)])
+def test_smoothing_by_windows_is_damped_jacobi_on_the_couplings(size, reach):
+    from refine.solvers.windows import by_windows
+
+    rows, excess = random_graph(size, reach, seed=3)
+    smoother, position = by_windows(rows, excess)
+    assert smoother.column.dtype == (np.uint16 if reach < 30_000 else np.uint32)
+    couplings = sp.csr_array((rows.value, rows.column, rows.start), shape=(size, size))
+    diagonal = excess + couplings.sum(axis=1)
+    b, x = np.random.default_rng(1).normal(size=(2, size)).astype(np.float32)
+    arranged = [np.empty(size, np.float32) for _ in range(4)]
+    for vector, values in zip(arranged, (b, x), strict=False):
+        vector[position] = values
+    smoother.again(arranged[0], arranged[1], arranged[2])
+    expected = 0.3 * x + 0.7 * (b + couplings @ x) / diagonal
+    np.testing.assert_allclose(arranged[2][position], expected, rtol=0.02, atol=0.02)
+    smoother.from_zero(arranged[0], arranged[2], arranged[3])
+    np.testing.assert_allclose(arranged[2][position], 0.7 * b / diagonal, rtol=0.02)
+    stepped = arranged[2][position]
+    left = b + couplings @ stepped - diagonal * stepped
+    np.testing.assert_allclose(arranged[3][position], left, rtol=0.02, atol=0.02 * np.abs(b).max())
+
+
+def test_what_is_smoothed_with_by_windows_keeps_the_excess():
+    """Rounded couplings would otherwise weigh more than a small excess: M' 1 = excess all the same."""
+    from refine.solvers.windows import by_windows
+
+    rows, excess = random_graph(1300, 100, seed=4)
+    smoother, position = by_windows(rows, 1e-4 * excess)
+    ones, moved = np.ones(1300, np.float32), np.empty(1300, np.float32)
+    smoother.again(np.zeros(1300, np.float32), ones, moved)
+    diagonal = 1e-4 * excess + sp.csr_array((rows.value, rows.column, rows.start)).sum(axis=1)
+    np.testing.assert_allclose(moved[position], 1 - 0.7 * 1e-4 * excess / diagonal, rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize(("size", "reach"), [(5000, 50), (20_000, 300), (20_000, 20_000)])
+def test_restriction_is_the_transpose_of_interpolation(size, reach):
+    from refine.solvers.transfer import transfer_of
+
+    rng = np.random.default_rng(5)
+    length = rng.integers(0, 4, size)
+    start = np.concatenate([[0], np.cumsum(length)]).astype(np.int32)
+    row = np.repeat(np.arange(size), length)
+    column = np.clip(row // 3 + rng.integers(-reach, reach + 1, row.size), 0, size // 3).astype(np.int32)
+    prolong = Rows(start, column, rng.uniform(0, 1, row.size).astype(np.float32))
+    identity = np.arange(size, dtype=np.int32)
+    coarse = rng.permutation(size // 3 + 1).astype(np.int32) if reach == size else identity[: size // 3 + 1]
+    transfer = transfer_of(prolong, identity, coarse)
+    assert transfer.bounds.size == (9 if reach < size / 10 else 2)
+    matrix = sp.csr_array((prolong.value, coarse[column], start), shape=(size, size // 3 + 1))
+    values, below = (
+        rng.normal(size=size).astype(np.float32),
+        rng.normal(size=size // 3 + 1).astype(np.float32),
+    )
+    out = np.full(size // 3 + 1, np.nan, np.float32)
+    transfer.restrict(values, out)
+    np.testing.assert_allclose(out, matrix.T @ values, rtol=1e-4, atol=1e-4)
+    raised = values.copy()
+    transfer.prolong(below, raised)
+    np.testing.assert_allclose(raised, values + matrix @ below, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("size", [2, 40, 900])
+def test_the_next_level_is_the_galerkin_product(size):
+    from refine.solvers.galerkin import coarse_graph, interpolation
+    from refine.solvers.splitting import COARSE, LOOSE, lead_with_strong, split
+
+    rows, excess = random_graph(size, 30, seed=6)
+    couplings = sp.csr_array((rows.value, rows.column, rows.start), shape=(size, size)).toarray()
+    diagonal = (excess + couplings.sum(axis=1)).astype(np.float32)
+    ends, state = lead_with_strong(rows.start, rows.column, rows.value, diagonal, 0.5, 0.2)
+    largest = couplings.max(axis=1)
+    for i in range(min(size, 100)):
+        there, own = ends[0, i], ends[1, i]
+        tied = np.flatnonzero(couplings[i])
+        strong = tied[couplings[i, tied] >= 0.5 * largest[i]] if state[i] != LOOSE else []
+        assert set(rows.column[there : ends[2, i]]) == set(strong)
+        strong_there = tied[(couplings[i, tied] >= 0.5 * largest[tied]) & (state[tied] != LOOSE)]
+        assert set(rows.column[rows.start[i] : own]) == set(strong_there)
+    bounds = np.array([0, size // 2, size])
+    split(rows.start, rows.column, ends, state, bounds)
+    prolong, coarse = interpolation(rows, diagonal, excess, ends, state)
+    assert coarse == (state == COARSE).sum()
+    graph, next_excess = coarse_graph(
+        rows, diagonal, excess, prolong, coarse, np.array([0, coarse // 3, coarse])
+    )
+    p = sp.csr_array((prolong.value, prolong.column, prolong.start), shape=(size, coarse)).astype(np.float64)
+    matrix = sp.csr_array(np.diag(excess + couplings.sum(axis=1)) - couplings)
+    expected = (p.T @ matrix @ p).toarray()
+    found = np.zeros((coarse, coarse))
+    found[np.repeat(np.arange(coarse), np.diff(graph.start)), graph.column] = -graph.value
+    found += np.diag(next_excess - found.sum(axis=1))
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5 * np.abs(couplings).max())
 
 
 def with_detours(matrix, width):
