@@ -61,7 +61,7 @@ def by_windows(graph: Rows, excess: Singles) -> tuple[WindowSmoother, Indices]:
     np.cumsum(longest, out=first[1:])
     near = reach + WINDOW <= _BACK
     begin = np.empty(first[-1] + 1, np.int32)
-    column = np.empty(graph.column.size, np.uint16 if near else np.uint32)
+    column: NDArray[np.unsignedinteger[Any]] = np.empty(graph.column.size, np.uint16 if near else np.uint32)
     value, step = np.empty(graph.value.size, np.uint16), np.empty(size, np.float32)
     back = _BACK if near else size
     _arrange(
