@@ -1,8 +1,8 @@
 """Training ConfNet and GradNet through the refinement against training them on their own losses for as long.
 
-`python -m benchmarks.joint --data DATA --weights RUN --out DIR`: both start from RUN's networks and see the same crops,
-optimizer and number of steps; what differs is the loss. The weights of either are kept by the refined disparity's error
-on the validation split. Prints the errors on the test split. Interrupted, it continues.
+`python -m benchmarks.joint --data DATA --weights RUN --out DIR [--test DATA]`: both start from RUN's networks and see
+the same crops, optimizer and number of steps; what differs is the loss. The weights of either are kept by the refined
+disparity's error on the validation split. Prints the errors on the test split. Interrupted, it continues.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ def further(options: argparse.Namespace, name: str, refined_weight: float) -> Pa
     return out
 
 
-def row(name: str, scores: dict[str, MethodScore], auc: float) -> str:
+def row(tested: str, name: str, scores: dict[str, MethodScore], auc: float) -> str:
     refined, gradnet = scores["ours"], scores["gradnet"]
     region = refined.regions["all"]
     numbers = f"{region.epe:.3f} | {region.bad * 100:.2f} | {refined.gradient_masked:.4f}"
-    return f"| {name} | {numbers} | {auc:.4f} | {gradnet.gradient_masked:.4f} |"
+    return f"| {tested} | {name} | {numbers} | {auc:.4f} | {gradnet.gradient_masked:.4f} |"
 
 
 def main() -> None:
@@ -54,6 +54,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", nargs="+", required=True)
+    parser.add_argument(
+        "--test", nargs="+", help="sets whose test splits are evaluated; else those of --data"
+    )
     parser.add_argument("--weights", type=Path, required=True)
     parser.add_argument("--out", required=True)
     parser.add_argument("--preset", default="tiny")
@@ -66,13 +69,13 @@ def main() -> None:
         "own losses": further(options, "own", 0.0),
         "joint": further(options, "joint", weight),
     }
-    print("| networks | EPE, px | > 1 px, % | gradient | ConfNet's AUC | GradNet's gradient |")
-    print("|---|---|---|---|---|---|")
+    print("| set | networks | EPE, px | > 1 px, % | gradient | ConfNet's AUC | GradNet's gradient |")
+    print("|---|---|---|---|---|---|---|")
     for name, run in runs.items():
         methods = open_settings(None, run).rows(METHODS)
-        for each in open_test_data(options.data, "test"):
+        for each in open_test_data(options.test or options.data, "test"):
             evaluation = evaluate_set(each, open_predictors(run), methods).evaluation
-            print(row(name, evaluation.scores, mean_aucs(evaluation)["confnet"]), flush=True)
+            print(row(each.name, name, evaluation.scores, mean_aucs(evaluation)["confnet"]), flush=True)
 
 
 if __name__ == "__main__":

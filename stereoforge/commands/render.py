@@ -43,7 +43,7 @@ class Render:
     """Folder of the data set, or a URL such as s3://bucket/folder."""
     family: Annotated[str | None, shown("NAME", DEFAULT_FAMILY)] = None
     """What kind of world."""
-    scenes: Annotated[int | None, shown("N", DEFAULT_SCENES)] = None
+    scenes: Annotated[int | None, shown("N", f"{DEFAULT_SCENES}, or the recipe's")] = None
     """How many scenes the split shall have in all."""
     frames_per_scene: Annotated[int | None, shown("N", 1)] = None
     """Frames in each scene."""
@@ -202,7 +202,7 @@ class Render:
         changes: dict[str, Any] = {"world": world}
         if self.scenes is not None or self.split is not None:
             split = self.split or "train"
-            changes["scenes"] = {split: DEFAULT_SCENES if self.scenes is None else self.scenes}
+            changes["scenes"] = {split: self._count(base, split) if self.scenes is None else self.scenes}
         if self.passes is not None:
             changes["passes"] = tuple(self.passes.split(","))
         if self.targets is not None:
@@ -217,6 +217,14 @@ class Render:
             return replace(base, **changes)
         except DatasetError as error:
             raise UsageError(str(error)) from error
+
+    def _count(self, base: Recipe, split: str) -> int:
+        """Scenes of a split of which --scenes does not say how many."""
+        if self.recipe is None:
+            return DEFAULT_SCENES
+        if split not in base.scenes:
+            raise UsageError(f"--recipe {self.recipe} has no scenes of split {split}; --scenes says how many")
+        return base.scenes[split]
 
     def _default_recipe(self) -> Recipe:
         family = self.family or DEFAULT_FAMILY

@@ -12,9 +12,11 @@ from datagen import Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.estimate import estimate_run
 from datagen.layout import Layout
 from datagen.manifest import read_manifest
+from datagen.recipe import write_recipe
 from scenes import FAMILIES
 from scenes.shapes.basic import Box, Superquadric
 from scenes.shapes.revolved import Cylinder
+from stereoforge.cli import main
 from stereoforge.values import shown_duration
 
 FOLDER = Path(__file__).parents[2] / "recipes"
@@ -42,6 +44,22 @@ def test_there_is_a_recipe_and_a_quick_one_for_each_family() -> None:
     for family in FAMILIES:
         quick = [name.startswith("cpu_") for name, recipe in recipes.items() if recipe.family == family]
         assert {True, False} <= set(quick), family
+
+
+def test_a_split_of_a_recipe_has_the_recipes_count(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "recipe.yaml"
+    write_recipe(path, RECIPE)
+    flags = ["render", "--recipe", str(path), "--out", str(tmp_path / "set"), "--dry-run", "--split"]
+    with pytest.raises(SystemExit) as end:
+        main([*flags, "test"])
+    assert end.value.code == 0
+    assert "2 test scenes" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as end:
+        main([*flags, "val"])
+    assert end.value.code == 2
+    assert "no scenes of split val" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_dry_run_counts_what_is_missing_and_measures_one_frame(tmp_path: Path) -> None:
