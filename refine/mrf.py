@@ -142,10 +142,11 @@ def checked_problem(
 ) -> Problem:
     """The inputs of `refine_disparity` as arrays, missing disparities filled; ValueError if one is wrong."""
     known, trust, slopes, colors = _checked(disparity, confidence, gradient, image)
-    initial = _filled(known)
+    unknown = np.isnan(known)
+    initial = _filled(known, unknown)
     return Problem(
         disparity=initial,
-        confidence=np.where(np.isnan(known), 0, trust),
+        confidence=np.where(unknown, 0, trust) if unknown.any() else trust,
         gradient=slopes,
         image=colors,
         parameters=parameters,
@@ -180,8 +181,8 @@ def _checked_start(x0: ArrayLike, shape: tuple[int, ...]) -> Floats:
 def _checked(
     disparity: ArrayLike, confidence: ArrayLike, gradient: ArrayLike, image: ArrayLike
 ) -> tuple[Floats, Floats, Floats, NDArray[np.uint8]]:
-    """The inputs as float64 (image: uint8) arrays, or a ValueError that says which is wrong and how."""
-    depths = np.asarray(disparity, dtype=np.float64)
+    """The inputs as contiguous float64 (image: uint8) arrays, or a ValueError that says which is wrong and how."""
+    depths = np.ascontiguousarray(disparity, dtype=np.float64)
     if depths.ndim != 2 or depths.size == 0:
         raise ValueError(f"disparity must be (H, W) with at least one pixel, got shape {depths.shape}")
     if np.isinf(depths).any():
@@ -191,7 +192,7 @@ def _checked(
             f"none of the {depths.shape[1]}x{depths.shape[0]} pixels has a disparity: all are NaN"
         )
     shape = depths.shape
-    trust = np.asarray(confidence, dtype=np.float64)
+    trust = np.ascontiguousarray(confidence, dtype=np.float64)
     if trust.shape != shape:
         raise ValueError(f"confidence has shape {trust.shape}, the disparity {shape}")
     if not ((trust >= 0) & (trust <= 1)).all():
@@ -199,21 +200,20 @@ def _checked(
             f"confidence must be in [0, 1] at every pixel, got {np.min(trust)} to {np.max(trust)}"
             f" with {int(np.isnan(trust).sum())} NaN"
         )
-    slopes = np.asarray(gradient, dtype=np.float64)
+    slopes = np.ascontiguousarray(gradient, dtype=np.float64)
     if slopes.shape != (*shape, 2):
         raise ValueError(f"gradient has shape {slopes.shape}, expected {(*shape, 2)} for this disparity")
     if np.isinf(slopes).any():
         raise ValueError("gradient holds infinities; mark missing values by NaN")
-    colors = np.asarray(image)
+    colors = np.ascontiguousarray(image)
     if colors.dtype != np.uint8 or colors.shape != (*shape, 3):
         got = f"{colors.dtype} {colors.shape}"
         raise ValueError(f"the image must be uint8 of shape {(*shape, 3)}, as the disparity; got {got}")
     return depths, trust, slopes, colors
 
 
-def _filled(disparity: Floats) -> Floats:
-    """The disparity with every NaN replaced by the nearest known value."""
-    unknown = np.isnan(disparity)
+def _filled(disparity: Floats, unknown: NDArray[np.bool_]) -> Floats:
+    """The disparity with every unknown value replaced by the nearest known one."""
     if not unknown.any():
         return disparity
     nearest = distance_transform_edt(unknown, return_distances=False, return_indices=True)

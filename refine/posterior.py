@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from refine.mrf import checked_problem
 from refine.parameters import MRFParameters
-from refine.solvers.chessboard import eliminate_black
+from refine.solvers.chessboard import coarsen
 from refine.solvers.krylov import krylov
 from refine.solvers.linear import SolverError
-from refine.solvers.multigrid import COLOR_SCALE, MAX_ITERATIONS, cycle_of
-from refine.solvers.stencils import Couplings, couplings_of, operator_of
+from refine.solvers.multigrid import COLOR_SCALE, MAX_ITERATIONS, Cycle
+from refine.solvers.stencils import Couplings, couplings_of, crop, system_of
 from refine.weights import NEIGHBORS, Floats
 
 TOLERANCE = 1e-3
@@ -58,19 +58,20 @@ def posterior_deviation(
         raise ValueError(f"samples must be at least 1, got {samples}")
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
     parts = couplings_of(problem)
-    operator = operator_of(parts, "exact")
-    cycle = cycle_of(operator, *eliminate_black(parts, COLOR_SCALE))
+    operator = system_of(problem, parts.tau).operator
+    cycle = Cycle(operator, coarsen(problem, parts.tau, COLOR_SCALE))
     rng = np.random.default_rng(seed)
     total = np.zeros(problem.shape)
     for _ in range(samples):
         noise = _perturbation(parts, rng)
-        solved = krylov(operator, noise, np.zeros_like(noise), TOLERANCE, cycle, MAX_ITERATIONS)
-        if not solved.converged:
+        size = float(np.linalg.norm(noise))
+        solved = krylov(operator, noise, TOLERANCE * size, cycle, MAX_ITERATIONS)
+        if not solved.residual <= TOLERANCE * size:
             raise SolverError(
-                f"a sample of the posterior stopped at a relative residual of {solved.relative_residual:.1e}, "
+                f"a sample of the posterior stopped at a relative residual of {solved.residual / size:.1e}, "
                 f"short of {TOLERANCE:.1e}"
             )
-        total += solved.x**2
+        total += crop(solved.x) ** 2
     return np.sqrt(total / samples / 2).astype(np.float32)
 
 

@@ -19,8 +19,9 @@ import numpy as np
 from numba import njit, prange
 
 from refine.solvers.hierarchy import Hierarchy, build_hierarchy
+from refine.solvers.linear import Problem
 from refine.solvers.rows import Indices, Rows
-from refine.solvers.stencils import Couplings, Singles
+from refine.solvers.stencils import Singles, bands, couplings_of
 from refine.solvers.windows import DAMPING
 
 STRONGER = np.float32(3)
@@ -35,14 +36,12 @@ _AROUND = np.array([(dy, dx) for dy in range(-2, 3) for dx in range(-2, 3) if 0 
 class Elimination:
     """Between the image and the pixels that are left. All planes padded as those of the image."""
 
+    tau: Singles
+    """(H, W) the M-matrix's excess."""
     ties: Singles
-    """(2, H, W) the M-matrix's coupling to the right and downwards."""
+    """(4, H, W) its couplings to the right, downwards, down right, and of the pixel to the right to the one below."""
     inverse: Singles
     """(H, W) 1 / diagonal at eliminated pixels, 0 elsewhere."""
-    number: Indices
-    """(H, W) of the pixels that are left, in reading order; -1 elsewhere."""
-    planes: Singles
-    """(6, H, W) couplings of the pixels that are left to each other, by the last six of `_AROUND`."""
 
     def restrict(self, residual: Singles, out: Singles) -> None:
         """The right-hand side of the pixels that are left, for a residual of all. At the others `out` means
@@ -50,128 +49,148 @@ class Elimination:
         _restrict(self.ties, self.inverse, residual, out)
 
     def prolong(self, left: Singles, residual: Singles, x: Singles) -> None:
-        """Add to `x` the solution for this residual that is `left` on the pixels that are left, 0 on the
-        others."""
+        """Add to `x` the solution for this residual that is `left` on the pixels that are left."""
         _prolong(self.ties, self.inverse, left, residual, x)
+
+    def graph(self) -> tuple[Rows, Singles, Indices]:
+        """Couplings and excess (`refine.solvers.hierarchy`) of the pixels that are left, and which they are."""
+        number = np.full(self.tau.shape, -1, np.int32)
+        inside = number[2:-2, 2:-2]
+        left = self.inverse[2:-2, 2:-2] == 0
+        inside[left] = np.arange(np.count_nonzero(left), dtype=np.int32)
+        start = np.zeros(np.count_nonzero(left) + 1, np.int32)
+        planes = np.zeros((6, *number.shape), np.float32)
+        _connect(self.ties, self.inverse, planes)
+        _count(planes, number, start)
+        np.cumsum(start, out=start)
+        column, value = np.empty(start[-1], np.int32), np.empty(start[-1], np.float32)
+        excess = np.empty(start.size - 1, np.float32)
+        _list(planes, number, start, column, value)
+        _hold(self.tau, self.ties, self.inverse, number, excess)
+        return Rows(start, column, value), excess, np.flatnonzero(number >= 0).astype(np.int32)
 
 
 @dataclass(frozen=True)
 class GridSmoother:
-    """`refine.solvers.hierarchy.Smoother` for the pixels that are left, without indices."""
+    """`refine.solvers.hierarchy.Smoother` for the pixels that are left, without indices.
 
-    planes: Singles
+    Vectors are padded images, flat. At eliminated pixels they hold the solution for a residual of 0 there, so that
+    what is left of the M-matrix is applied as the M-matrix itself.
+    """
+
+    elimination: Elimination
     step: Singles
-    """Flat, `DAMPING` / diagonal; 0 at pixels that are eliminated."""
+    """`DAMPING` / diagonal; 0 at pixels that are eliminated."""
 
     def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
-        step, b, x, left = (vector.reshape(self.planes.shape[1:]) for vector in (self.step, b, x, left))
-        _from_zero(self.planes, step, b, x, left)
+        of, shape = self.elimination, self.elimination.tau.shape
+        step, b, x, left = (vector.reshape(shape) for vector in (self.step, b, x, left))
+        _from_zero(of.tau, of.ties, of.inverse, step, b, x, left)
 
     def again(self, b: Singles, x: Singles, out: Singles) -> None:
-        step, b, x, out = (vector.reshape(self.planes.shape[1:]) for vector in (self.step, b, x, out))
-        _again(self.planes, step, b, x, out)
+        of, shape = self.elimination, self.elimination.tau.shape
+        step, b, x, out = (vector.reshape(shape) for vector in (self.step, b, x, out))
+        _again(of.tau, of.ties, of.inverse, step, b, x, out)
 
 
-def grid_hierarchy(elimination: Elimination, graph: Rows, excess: Singles) -> Hierarchy:
+@dataclass(frozen=True)
+class Coarsening:
+    """All below the image."""
+
+    elimination: Elimination
+    hierarchy: Hierarchy
+    """For vectors that are padded images, flat."""
+
+
+def coarsen(problem: Problem, tau: Singles, color_scale: float) -> Coarsening:
+    """The elimination and the hierarchy for a refinement's M-matrix (`eliminate_black`)."""
+    elimination = eliminate_black(problem, tau, color_scale)
+    return Coarsening(elimination, grid_hierarchy(elimination))
+
+
+def grid_hierarchy(elimination: Elimination) -> Hierarchy:
     """The hierarchy below the image for vectors that are padded images, flat."""
 
-    def arrange(graph: Rows, excess: Singles) -> tuple[GridSmoother, Indices]:
-        place = np.flatnonzero(elimination.number.ravel() >= 0).astype(np.int32)
-        step = np.zeros_like(elimination.inverse)
-        _invert(graph.start, graph.value, excess, place, step.ravel())
-        return GridSmoother(elimination.planes, step.ravel()), place
+    def arrange(graph: Rows, excess: Singles, place: Indices) -> GridSmoother:
+        step = np.zeros(elimination.tau.size, np.float32)
+        _invert(graph.start, graph.value, excess, place, step)
+        return GridSmoother(elimination, step)
 
-    return build_hierarchy(graph, excess, arrange)
+    return build_hierarchy(elimination.graph, arrange)
 
 
-def eliminate_black(parts: Couplings, color_scale: float) -> tuple[Elimination, Rows, Singles]:
-    """The elimination, and couplings and excess (`refine.solvers.hierarchy`) of the pixels that are left.
+def eliminate_black(problem: Problem, tau: Singles, color_scale: float) -> Elimination:
+    """The elimination from a refinement's M-matrix.
 
-    The M-matrix has data and gradient terms as they are, and for the colour term the graph Laplacian with
-    couplings color_scale (color_p w_pq + color_q w_qp).
+    That has data and gradient terms as they are, and for the colour term the graph Laplacian with couplings
+    color_scale (color_p w_pq + color_q w_qp).
     """
-    scale = np.float32(color_scale)
-    ties, inverse = np.zeros_like(parts.axial), np.zeros_like(parts.tau)
-    _tie(parts.weights, parts.color, parts.axial, scale, ties)
-    loose, side = np.zeros_like(parts.tau), np.full(parts.tau.shape, _NOWHERE, np.int8)
-    _detours(parts.weights, parts.color, scale, ties, loose, side)
-    _take_over(loose, side, ties)
-    _choose(parts.tau, ties, loose, inverse)
-    number = np.full(parts.tau.shape, -1, np.int32)
-    inside = number[2:-2, 2:-2]
-    left = inverse[2:-2, 2:-2] == 0
-    inside[left] = np.arange(np.count_nonzero(left), dtype=np.int32)
-    start = np.zeros(np.count_nonzero(left) + 1, np.int32)
-    planes = np.zeros((6, *number.shape), np.float32)
-    _connect(parts.weights, parts.color, scale, ties, loose, inverse, planes)
-    _count(planes, number, start)
-    np.cumsum(start, out=start)
-    column, value = np.empty(start[-1], np.int32), np.empty(start[-1], np.float32)
-    excess = np.empty(start.size - 1, np.float32)
-    _list(planes, number, start, column, value)
-    _hold(parts.tau, ties, inverse, number, excess)
-    return Elimination(ties, inverse, number, planes), Rows(start, column, value), excess
+    ties, inverse = np.zeros((4, *tau.shape), np.float32), np.zeros_like(tau)
+    for first, last in bands(problem.shape[0]):
+        parts = couplings_of(problem, first, last)
+        _tie(parts.weights, parts.color, parts.axial, np.float32(color_scale), first, ties)
+    side = np.full(tau.shape, _NOWHERE, np.int8)
+    _detours(ties, side)
+    _take_over(side, ties)
+    _choose(tau, ties, inverse)
+    return Elimination(tau, ties, inverse)
 
 
 @njit(cache=True, parallel=True)
-def _tie(weights, color, axial, scale, ties):
-    """Numbers of `NEIGHBORS`: 4 right, 3 left, 6 below, 1 above."""
+def _tie(weights, color, axial, scale, first, ties):
+    """Numbers of `NEIGHBORS`: 4 right and 3 left, 6 below and 1 above, 7 and 0, 5 and 2."""
     height, width = color.shape[0] - 4, color.shape[1] - 4
-    for y in prange(2, height + 2):
-        for x in range(2, width + 2):
-            across = color[y, x] * weights[4, y, x] + color[y, x + 1] * weights[3, y, x + 1]
-            downwards = color[y, x] * weights[6, y, x] + color[y + 1, x] * weights[1, y + 1, x]
-            ties[0, y, x] = scale * across + axial[0, y, x]
-            ties[1, y, x] = scale * downwards + axial[1, y, x]
-
-
-@njit(cache=True)
-def _diagonal_tie(weights, color, scale, y, x, v, u):
-    """The colour term's coupling of two pixels diagonally next to each other."""
-    number = (v - y + 1) * 3 + u - x + 1
-    number -= number > 4
-    return scale * (color[y, x] * weights[number, y, x] + color[v, u] * weights[7 - number, v, u])
+    for row in prange(height):
+        y, to = row + 2, row + 2 + first
+        for x in range(width):
+            here, there = color[y, x + 2], color[y, x + 3]
+            below, beyond = color[y + 1, x + 2], color[y + 1, x + 3]
+            across = here * weights[4, y, x + 2] + there * weights[3, y, x + 3]
+            downwards = here * weights[6, y, x + 2] + below * weights[1, y + 1, x + 2]
+            ties[0, to, x + 2] = scale * across + axial[0, y, x + 2]
+            ties[1, to, x + 2] = scale * downwards + axial[1, y, x + 2]
+            ties[2, to, x + 2] = scale * (here * weights[7, y, x + 2] + beyond * weights[0, y + 1, x + 3])
+            ties[3, to, x + 2] = scale * (there * weights[5, y, x + 3] + below * weights[2, y + 1, x + 2])
 
 
 _TOP, _BOTTOM, _LEFT, _RIGHT, _NOWHERE = 0, 1, 2, 3, 4
 
 
 @njit(cache=True)
-def _detour(weights, color, scale, ties, y, x):
-    """The coupling of the two black pixels among four, (y, x) upper left, and the side of the square that
-    takes it over."""
+def _detour(ties, y, x):
+    """The side of the square, (y, x) upper left, that takes over the coupling of the two black pixels in it."""
     top, bottom = ties[0, y, x], ties[0, y + 1, x]
     left, right = ties[1, y, x], ties[1, y, x + 1]
     strongest = max(max(top, bottom), max(left, right))
     if (y + x) % 2 == 0:  # Black are the upper right and the lower left.
-        tie = _diagonal_tie(weights, color, scale, y, x + 1, y + 1, x)
+        tie = ties[3, y, x]
         after_top, after_bottom, after_left, after_right = _LEFT, _RIGHT, _TOP, _BOTTOM
     else:
-        tie = _diagonal_tie(weights, color, scale, y, x, y + 1, x + 1)
+        tie = ties[2, y, x]
         after_top, after_bottom, after_left, after_right = _RIGHT, _LEFT, _BOTTOM, _TOP
     if strongest < STRONGER * tie:
-        return tie, _NOWHERE
+        return _NOWHERE
     if strongest == top:
-        return tie, after_top
+        return after_top
     if strongest == bottom:
-        return tie, after_bottom
-    return tie, after_left if strongest == left else after_right
+        return after_bottom
+    return after_left if strongest == left else after_right
 
 
 @njit(cache=True, parallel=True)
-def _detours(weights, color, scale, ties, tie, side):
-    for row in prange(tie.shape[0] - 5):
+def _detours(ties, side):
+    for row in prange(side.shape[0] - 5):
         y = np.int64(row) + 2  # numba's parallel indices are unsigned
-        for x in range(2, tie.shape[1] - 3):
-            tie[y, x], side[y, x] = _detour(weights, color, scale, ties, y, x)
+        for x in range(2, side.shape[1] - 3):
+            side[y, x] = _detour(ties, y, x)
 
 
 @njit(cache=True, parallel=True)
-def _take_over(tie, side, ties):
-    """Add to each coupling what it takes over from the squares on its two sides; keep in `tie` the rest."""
-    for row in prange(tie.shape[0] - 4):
+def _take_over(side, ties):
+    """Add to each coupling what it takes over from the squares on its two sides, which have it no more."""
+    for row in prange(side.shape[0] - 4):
         y = np.int64(row) + 2
-        for x in range(2, tie.shape[1] - 2):
+        for x in range(2, side.shape[1] - 2):
             for v, u, which, axis in (
                 (y, x, _TOP, 0),
                 (y - 1, x, _BOTTOM, 0),
@@ -179,47 +198,46 @@ def _take_over(tie, side, ties):
                 (y, x - 1, _RIGHT, 1),
             ):
                 if side[v, u] == which:
-                    ties[axis, y, x] += tie[v, u]
-    for row in prange(tie.shape[0] - 4):
+                    ties[axis, y, x] += ties[3 - (v + u) % 2, v, u]
+    for row in prange(side.shape[0] - 4):
         y = np.int64(row) + 2
-        for x in range(2, tie.shape[1] - 2):
+        for x in range(2, side.shape[1] - 2):
             if side[y, x] != _NOWHERE:
-                tie[y, x] = 0
+                ties[3 - (y + x) % 2, y, x] = 0
 
 
 @njit(cache=True, parallel=True)
-def _choose(tau, ties, loose, inverse):
+def _choose(tau, ties, inverse):
     """1 / diagonal at the black pixels that no other is coupled to: those to be eliminated."""
     height, width = tau.shape[0] - 4, tau.shape[1] - 4
     for row in prange(height):
         y = np.int64(row) + 2
         for x in range(3 - y % 2, width + 2, 2):
             held = tau[y, x] + ties[0, y, x] + ties[0, y, x - 1] + ties[1, y, x] + ties[1, y - 1, x]
-            alone = max(max(loose[y, x], loose[y, x - 1]), max(loose[y - 1, x], loose[y - 1, x - 1])) == 0
-            if alone and held > _LEAST:
+            diagonal = max(
+                max(ties[2, y, x], ties[2, y - 1, x - 1]), max(ties[3, y, x - 1], ties[3, y - 1, x])
+            )
+            if diagonal == 0 and held > _LEAST:
                 inverse[y, x] = 1 / held
 
 
 @njit(cache=True, parallel=True)
-def _connect(weights, color, scale, ties, loose, inverse, planes):
+def _connect(ties, inverse, planes):
     """What couples the pixels that are left, square by square, (y, x) upper left."""
-    for row in prange(loose.shape[0] - 4):
+    for row in prange(inverse.shape[0] - 4):
         y = np.int64(row) + 2
-        for x in range(2, loose.shape[1] - 2):
+        for x in range(2, inverse.shape[1] - 2):
             top, bottom = ties[0, y, x], ties[0, y + 1, x]
             left, right = ties[1, y, x], ties[1, y, x + 1]
             planes[0, y, x] = top if max(inverse[y, x], inverse[y, x + 1]) == 0 else 0
             planes[3, y, x] = left if max(inverse[y, x], inverse[y + 1, x]) == 0 else 0
             planes[1, y, x] = top * inverse[y, x + 1] * ties[0, y, x + 1]
             planes[5, y, x] = left * inverse[y + 1, x] * ties[1, y + 1, x]
+            planes[4, y, x], planes[2, y, x + 1] = ties[2, y, x], ties[3, y, x]
             if (y + x) % 2 == 0:  # Black are the upper right and the lower left.
-                through = top * inverse[y, x + 1] * right + left * inverse[y + 1, x] * bottom
-                planes[4, y, x] = through + _diagonal_tie(weights, color, scale, y, x, y + 1, x + 1)
-                planes[2, y, x + 1] = loose[y, x]
+                planes[4, y, x] += top * inverse[y, x + 1] * right + left * inverse[y + 1, x] * bottom
             else:
-                through = top * inverse[y, x] * left + right * inverse[y + 1, x + 1] * bottom
-                planes[2, y, x + 1] = through + _diagonal_tie(weights, color, scale, y, x + 1, y + 1, x)
-                planes[4, y, x] = loose[y, x]
+                planes[2, y, x + 1] += top * inverse[y, x] * left + right * inverse[y + 1, x + 1] * bottom
 
 
 @njit(cache=True)
@@ -293,48 +311,63 @@ def _restrict(ties, inverse, residual, out):
             out[y + 2, x + 2] = residual[y + 2, x + 2] + _gathered(ties, inverse, residual, y + 2, x + 2)
 
 
+@njit(cache=True, fastmath={"contract"})
+def _beside(ties, x, y, j):
+    """The sum over the couplings of (y + 2, j + 2) to the four pixels beside it. Written with `y + 2 - 1`: an index
+    that may be negative keeps LLVM from vectorising."""
+    total = ties[0, y + 2, j + 2] * x[y + 2, j + 3] + ties[0, y + 2, j + 1] * x[y + 2, j + 1]
+    return total + ties[1, y + 2, j + 2] * x[y + 3, j + 2] + ties[1, y + 1, j + 2] * x[y + 1, j + 2]
+
+
 @njit(cache=True, parallel=True, fastmath={"contract"})
 def _prolong(ties, inverse, left, residual, x):
     height, width = residual.shape[0] - 4, residual.shape[1] - 4
     for y in prange(height):
         for j in range(width):
-            around = residual[y + 2, j + 2] + ties[0, y + 2, j + 2] * left[y + 2, j + 3]
-            around += ties[0, y + 2, j + 1] * left[y + 2, j + 1]
-            around += ties[1, y + 2, j + 2] * left[y + 3, j + 2] + ties[1, y + 1, j + 2] * left[y + 1, j + 2]
-            x[y + 2, j + 2] += left[y + 2, j + 2] + inverse[y + 2, j + 2] * around
+            held = inverse[y + 2, j + 2]
+            through = held * (residual[y + 2, j + 2] + _beside(ties, left, y, j))
+            x[y + 2, j + 2] += left[y + 2, j + 2] if held == 0 else through
 
 
 @njit(cache=True, fastmath={"contract"})
-def _both(planes, k, x, y, j, dy, dx):
-    """What the couplings k ahead and behind of (y + 2, j + 2) bring. Written as `j + 2 - dx`: indices that might be
-    negative keep LLVM from vectorising."""
-    ahead = planes[k, y + 2, j + 2] * x[y + 2 + dy, j + 2 + dx]
-    return ahead + planes[k, y + 2 - dy, j + 2 - dx] * x[y + 2 - dy, j + 2 - dx]
+def _fill_row(ties, inverse, x, y):
+    """Put in what eliminated pixels have for a residual of 0. They lie between pixels that are left only."""
+    for j in range(inverse.shape[1] - 4):
+        held = inverse[y + 2, j + 2]
+        x[y + 2, j + 2] = x[y + 2, j + 2] if held == 0 else held * _beside(ties, x, y, j)
 
 
 @njit(cache=True, fastmath={"contract"})
-def _coupled(planes, x, y, j):
-    """The sum over the couplings of (y + 2, j + 2)."""
-    total = _both(planes, 0, x, y, j, 0, 1) + _both(planes, 1, x, y, j, 0, 2)
-    total += _both(planes, 2, x, y, j, 1, -1) + _both(planes, 3, x, y, j, 1, 0)
-    return total + _both(planes, 4, x, y, j, 1, 1) + _both(planes, 5, x, y, j, 2, 0)
+def _remainder(tau, ties, b, x, y, j):
+    """b - M x at (y + 2, j + 2), from differences."""
+    c = x[y + 2, j + 2]
+    total = b[y + 2, j + 2] - tau[y + 2, j + 2] * c
+    total += ties[0, y + 2, j + 2] * (x[y + 2, j + 3] - c) + ties[0, y + 2, j + 1] * (x[y + 2, j + 1] - c)
+    total += ties[1, y + 2, j + 2] * (x[y + 3, j + 2] - c) + ties[1, y + 1, j + 2] * (x[y + 1, j + 2] - c)
+    total += ties[2, y + 2, j + 2] * (x[y + 3, j + 3] - c) + ties[2, y + 1, j + 1] * (x[y + 1, j + 1] - c)
+    return (
+        total + ties[3, y + 2, j + 1] * (x[y + 3, j + 1] - c) + ties[3, y + 1, j + 2] * (x[y + 1, j + 3] - c)
+    )
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
-def _from_zero(planes, step, b, x, left):
-    height, width = step.shape[0] - 4, step.shape[1] - 4
+def _from_zero(tau, ties, inverse, step, b, x, left):
+    height, width = tau.shape[0] - 4, tau.shape[1] - 4
     for y in prange(height):
         for j in range(width):
             x[y + 2, j + 2] = step[y + 2, j + 2] * b[y + 2, j + 2]
     for y in prange(height):
+        _fill_row(ties, inverse, x, y)
+    for y in prange(height):
         for j in range(width):
-            left[y + 2, j + 2] = (1 - DAMPING) * b[y + 2, j + 2] + _coupled(planes, x, y, j)
+            left[y + 2, j + 2] = _remainder(tau, ties, b, x, y, j)
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
-def _again(planes, step, b, x, out):
-    height, width = step.shape[0] - 4, step.shape[1] - 4
+def _again(tau, ties, inverse, step, b, x, out):
+    height, width = tau.shape[0] - 4, tau.shape[1] - 4
+    for y in prange(height):
+        _fill_row(ties, inverse, x, y)
     for y in prange(height):
         for j in range(width):
-            total = b[y + 2, j + 2] + _coupled(planes, x, y, j)
-            out[y + 2, j + 2] = (1 - DAMPING) * x[y + 2, j + 2] + step[y + 2, j + 2] * total
+            out[y + 2, j + 2] = x[y + 2, j + 2] + step[y + 2, j + 2] * _remainder(tau, ties, b, x, y, j)

@@ -56,18 +56,21 @@ class Smoother(Protocol):
         """A step from `x`, into `out`."""
 
 
-Arrangement = Callable[[Rows, Singles], tuple[Smoother, Indices]]
-"""Couplings and excess to the smoother, and where in its vectors each unknown is."""
+Arrangement = Callable[[Rows, Singles, Indices], Smoother]
+"""Couplings, excess, and where in its vectors each unknown is, to the smoother."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """One level: how it is smoothed, and how the next one is interpolated to it."""
+    """One level: how it is smoothed, and how the next one is interpolated to it. The rest is for the cycle's use."""
 
     smoother: Smoother
     transfer: Transfer
-    work: Singles
-    """(3, size) for the cycle's own use: right-hand side, solution and what is left of the former."""
+    x: Singles
+    left: Singles
+    """Of the right-hand side; then the smoothed solution."""
+    below: Singles
+    """The next level's right-hand side."""
 
 
 @dataclass(frozen=True)
@@ -77,46 +80,47 @@ class Hierarchy:
     levels: tuple[Level, ...]
     coarsest: Singles
     """Inverse of the coarsest matrix, dense; of its diagonal alone where coarsening ended early."""
-    position: Indices
-    """Of each unknown of the graph in the first level's vectors."""
 
     def correct(self, residual: Singles) -> Singles:
         """An approximate solution on the first level, by one symmetric V-cycle; overwritten by the next call."""
-        sides = [residual]
-        for level, below in zip(self.levels, (*self.levels[1:], None), strict=True):
-            _, x, left = level.work
-            level.smoother.from_zero(sides[-1], x, left)
-            sides.append(below.work[0] if below else np.empty(self.coarsest.shape[0], np.float32))
-            level.transfer.restrict(left, sides[-1])
-        b = sides.pop()
-        correction = self.coarsest * b if self.coarsest.ndim == 1 else _product(self.coarsest, b)
-        for level in reversed(self.levels):
-            _, x, out = level.work
-            level.transfer.prolong(correction, x)
-            level.smoother.again(sides.pop(), x, out)
-            correction = out
+        side = residual
+        for level in self.levels:
+            level.smoother.from_zero(side, level.x, level.left)
+            level.transfer.restrict(level.left, level.below)
+            side = level.below
+        correction = self.coarsest * side if self.coarsest.ndim == 1 else _product(self.coarsest, side)
+        sides = (residual, *(level.below for level in self.levels[:-1]))
+        for level, side in zip(reversed(self.levels), reversed(sides), strict=True):
+            level.transfer.prolong(correction, level.x)
+            level.smoother.again(side, level.x, level.left)
+            correction = level.left
         return correction
 
 
-def build_hierarchy(graph: Rows, excess: Singles, arrange: Arrangement = by_windows) -> Hierarchy:
-    """Coarsen the M-matrix with these couplings and this excess; the order of couplings within rows is changed.
+def build_hierarchy(first: Callable[[], tuple[Rows, Singles, Indices]], arrange: Arrangement) -> Hierarchy:
+    """Coarsen an M-matrix.
 
-    `arrange` says how the first level is smoothed.
+    Args:
+        first: Makes its couplings, its excess, and says where in the first level's vectors its unknowns are. A
+            function, so that none but the hierarchy holds the couplings, and only as long as it needs them.
+        arrange: Makes the smoother of the first level.
     """
     levels: list[Level] = []
-    smoother, position = arrange(graph, excess)
-    first, kept = position, 0.0
+    graph, excess, position = first()
+    smoother = arrange(graph, excess, position)
     while True:
         diagonal = _diagonal(graph.start, graph.value, excess)
         ends, state = lead_with_strong(*of(graph), diagonal, STRENGTH, LOOSE)
         split(graph.start, graph.column, ends, state, _bounds(state.size))
         prolong, coarse = interpolation(graph, diagonal, excess, ends, state)
+        del ends
         graph, excess = coarse_graph(graph, diagonal, excess, prolong, coarse, _bounds(coarse))
         kept = coarse / state.size
-        last = excess.size <= COARSEST or kept > _STALLED or len(levels) + 1 == _MAX_LEVELS
+        last = coarse <= COARSEST or kept > _STALLED or len(levels) + 1 == _MAX_LEVELS
         below, new_position = (None, np.arange(coarse, dtype=np.int32)) if last else by_windows(graph, excess)
-        work = np.zeros((3, smoother.step.size), np.float32)
-        levels.append(Level(smoother, transfer_of(prolong, position, new_position), work))
+        transfer = transfer_of(prolong, position, new_position)
+        vectors = (np.zeros(size, np.float32) for size in (smoother.step.size, smoother.step.size, coarse))
+        levels.append(Level(smoother, transfer, *vectors))
         if below is None:
             break
         smoother, position = below, new_position
@@ -124,7 +128,7 @@ def build_hierarchy(graph: Rows, excess: Singles, arrange: Arrangement = by_wind
     coarsest = (
         _dense_inverse(graph, excess) if dense else _inverse(_diagonal(graph.start, graph.value, excess))
     )
-    return Hierarchy(tuple(levels), coarsest, first)
+    return Hierarchy(tuple(levels), coarsest)
 
 
 def _bounds(size: int) -> NDArray[np.int64]:

@@ -1,43 +1,70 @@
-"""Conjugate gradients and BiCGSTAB over stencil operators, in float64 with float32 coefficients."""
+"""Conjugate gradients and BiCGSTAB over stencil operators: float32, with the solution kept and judged in float64."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
 
-from refine.solvers.linear import LinearSolution
-from refine.solvers.stencils import Singles, StencilOperator, crop
+from refine.solvers.linear import LinearSolution, Problem
+from refine.solvers.stencils import Singles, StencilOperator, System, crop
 from refine.weights import Floats
 
-Preconditioner = Callable[[Singles], Singles]
-"""Residual to correction, both padded; the correction may be overwritten by the next call."""
+Preconditioner = Callable[[Singles, Singles], None]
+"""Of a residual, a correction into the second array; both padded."""
+
+_RENEWED = 1e-3
+"""Each time the residual has shrunk by this factor it is worked out anew from the solution: the one that the
+steps keep has then drifted by the rounding of far larger ones (van der Vorst and Ye 2000). Directions stay."""
+
+
+@dataclass(frozen=True)
+class Iterated:
+    """What was reached."""
+
+    x: Floats
+    """Padded."""
+    iterations: int
+    residual: float
+    """|b - A x|."""
+
+
+def solve_iteratively(
+    problem: Problem, system: System, tolerance: float, precondition: Preconditioner, max_iterations: int
+) -> LinearSolution:
+    """The problem's solution from its start on, until |b - A x| <= tolerance |b|; overwrites the system's
+    residual."""
+    size = system.size or 1.0
+    reached = krylov(system.operator, system.residual, tolerance * size, precondition, max_iterations)
+    relative = reached.residual / size
+    x = crop(reached.x) + problem.start
+    return LinearSolution(x, reached.iterations, relative, relative <= tolerance)
 
 
 def krylov(
     operator: StencilOperator,
-    right_hand_side: Floats,
-    start: Floats,
-    tolerance: float,
+    b: Floats,
+    target: float,
     precondition: Preconditioner,
     max_iterations: int,
-) -> LinearSolution:
-    """Conjugate gradients for a symmetric operator, BiCGSTAB for another, until |b - A x| <= tolerance |b|.
+) -> Iterated:
+    """Conjugate gradients for a symmetric operator, BiCGSTAB for another, from 0 until |b - A x| <= target.
 
-    Arrays padded; `start` is overwritten. The preconditioner works in float32 on residuals scaled to norm 1, so
-    that tight tolerances do not sink below its range. A BiCGSTAB iteration costs about two of CG.
+    `b` is padded, and overwritten. A BiCGSTAB iteration costs about two of CG.
     """
+    x = np.zeros(b.shape)
+    size = math.sqrt(_dot(b, b))
+    if not size > target:
+        return Iterated(x, 0, size)
+    b /= size  # so that tight tolerances do not sink below what float32 can hold
     method = _conjugate_gradients if operator.symmetric else _bicgstab
-    size = float(np.linalg.norm(right_hand_side)) or 1.0
-    x = start
     with np.errstate(all="ignore"):  # a breakdown shows as a residual that is not finite
-        iterations = method(operator, right_hand_side, x, tolerance * size, precondition, max_iterations)
-    residual = np.zeros_like(x)
-    operator.apply(x, residual)
-    # The recurrence's own residual drifts from the true one, so convergence is judged by the true one.
-    relative = float(np.linalg.norm(right_hand_side - residual)) / size
-    return LinearSolution(np.ascontiguousarray(crop(x)), iterations, relative, relative <= 2 * tolerance)
+        iterations, residual = method(operator, b, x, target / size, precondition, max_iterations)
+    x *= size
+    return Iterated(x, iterations, residual * size)
 
 
 def _conjugate_gradients(
@@ -47,23 +74,23 @@ def _conjugate_gradients(
     target: float,
     precondition: Preconditioner,
     max_iterations: int,
-) -> int:
-    product, direction = np.zeros_like(x), np.zeros_like(x)
-    operator.apply(x, product)
-    residual = b - product
-    norm = float(np.linalg.norm(residual))
-    before = 1.0
+) -> tuple[int, float]:
+    residual = b.astype(np.float32)
+    direction, product = np.zeros_like(residual), np.zeros_like(residual)
+    norm = renewed = before = 1.0
     for iteration in range(max_iterations):
-        if not norm > target:
-            return iteration
-        correction = _scaled(precondition, residual, norm)
-        energy = norm * _dot(residual, correction)
-        _advance(direction, correction, norm, energy / before if iteration else 0.0)
-        operator.apply(direction, product)
-        step = energy / _dot(direction, product)
-        norm = float(np.sqrt(_step(x, residual, direction, product, step)))
+        if not norm > max(target, _RENEWED * renewed):
+            norm = renewed = math.sqrt(operator.remainder(b, x, residual))
+            if not norm > target:
+                return iteration, norm
+        correction = product  # the last product is done with
+        precondition(residual, correction)
+        energy = _dot(residual, correction)
+        _advance(direction, correction, energy / before if iteration else 0.0)
+        along, _ = operator.apply_against(direction, direction, product)
+        norm = math.sqrt(_step(x, residual, direction, product, np.float32(energy / along)))
         before = energy
-    return max_iterations
+    return max_iterations, math.sqrt(operator.remainder(b, x, residual))
 
 
 def _bicgstab(
@@ -73,81 +100,72 @@ def _bicgstab(
     target: float,
     precondition: Preconditioner,
     max_iterations: int,
-) -> int:
-    """van der Vorst 1992, preconditioned from the right."""
-    product, second, direction = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
-    operator.apply(x, second)
-    residual = b - second
-    shadow = residual.copy()
-    norm = float(np.linalg.norm(residual))
-    rho = alpha = omega = 1.0
+) -> tuple[int, float]:
+    """van der Vorst 1992, preconditioned from the right; the shadow residual is b."""
+    residual = b.astype(np.float32)
+    direction, product = np.zeros_like(residual), np.zeros_like(residual)
+    half, second = np.zeros_like(residual), np.zeros_like(residual)
+    norm = renewed = rho = alpha = omega = 1.0
     for iteration in range(max_iterations):
+        if not norm > max(target, _RENEWED * renewed):
+            norm = renewed = math.sqrt(operator.remainder(b, x, residual))
+            if not norm > target:
+                return iteration, norm
+        before, rho = rho, _dot(b, residual)
+        _redirect(direction, residual, product, (rho / before) * (alpha / omega), omega)
+        precondition(direction, half)
+        shadow, _ = operator.apply_against(half, b, product)
+        alpha = rho / shadow
+        norm = math.sqrt(_step(x, residual, half, product, np.float32(alpha)))
         if not norm > target:
-            return iteration
-        before, rho = rho, _dot(shadow, residual)
-        # direction = residual + beta (direction - omega product)
-        direction -= omega * product
-        direction *= (rho / before) * (alpha / omega)
-        direction += residual
-        size = float(np.linalg.norm(direction))
-        half = _scaled(precondition, direction, size).astype(np.float64) * size
-        operator.apply(half, product)
-        alpha = rho / _dot(shadow, product)
-        x += alpha * half
-        residual -= alpha * product
-        norm = float(np.linalg.norm(residual))
-        if not norm > target:
-            return iteration + 1
-        half = _scaled(precondition, residual, norm).astype(np.float64) * norm
-        operator.apply(half, second)
-        omega = _dot(second, residual) / _dot(second, second)
-        x += omega * half
-        residual -= omega * second
-        norm = float(np.linalg.norm(residual))
-    return max_iterations
+            norm = renewed = math.sqrt(operator.remainder(b, x, residual))
+            if not norm > target:
+                return iteration + 1, norm
+        precondition(residual, half)
+        along, size = operator.apply_against(half, residual, second)
+        omega = along / size
+        norm = math.sqrt(_step(x, residual, half, second, np.float32(omega)))
+    return max_iterations, math.sqrt(operator.remainder(b, x, residual))
 
 
-def _scaled(precondition: Preconditioner, residual: Floats, norm: float) -> Singles:
-    scaled = np.empty(residual.shape, np.float32)
-    _scale(residual, 1 / norm, scaled)
-    return precondition(scaled)
-
-
-@njit(cache=True, parallel=True)
-def _scale(x, factor, out):
-    for y in prange(x.shape[0]):
-        for j in range(x.shape[1]):
-            out[y, j] = factor * x[y, j]
-
-
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
 def _dot(a, b):
     total = 0.0
     for y in prange(a.shape[0]):
         row = 0.0
         for x in range(a.shape[1]):
-            row += a[y, x] * b[y, x]
+            row += np.float64(a[y, x]) * np.float64(b[y, x])
         total += row
     return total
 
 
 @njit(cache=True, parallel=True)
-def _advance(direction, correction, scale, momentum):
+def _advance(direction, correction, momentum):
+    factor = np.float32(momentum)
     for y in prange(direction.shape[0]):
         for x in range(direction.shape[1]):
-            direction[y, x] = scale * correction[y, x] + momentum * direction[y, x]
+            direction[y, x] = correction[y, x] + factor * direction[y, x]
 
 
 @njit(cache=True, parallel=True)
+def _redirect(direction, residual, product, momentum, omega):
+    """direction = residual + momentum (direction - omega product)."""
+    factor, along = np.float32(momentum), np.float32(omega)
+    for y in prange(direction.shape[0]):
+        for x in range(direction.shape[1]):
+            direction[y, x] = residual[y, x] + factor * (direction[y, x] - along * product[y, x])
+
+
+@njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
 def _step(x, residual, direction, product, step):
     """One step along `direction`; the squared norm of the new residual."""
     total = 0.0
     for y in prange(x.shape[0]):
         row = 0.0
         for j in range(x.shape[1]):
-            x[y, j] += step * direction[y, j]
+            x[y, j] += np.float64(step) * np.float64(direction[y, j])
             value = residual[y, j] - step * product[y, j]
             residual[y, j] = value
-            row += value * value
+            row += np.float64(value) * np.float64(value)
         total += row
     return total

@@ -14,12 +14,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from refine.solvers.chessboard import Elimination, eliminate_black, grid_hierarchy
-from refine.solvers.hierarchy import Hierarchy
-from refine.solvers.krylov import krylov
+from refine.solvers.chessboard import Coarsening, coarsen
+from refine.solvers.krylov import solve_iteratively
 from refine.solvers.linear import LinearSolution, Problem
-from refine.solvers.rows import Rows
-from refine.solvers.stencils import Singles, StencilOperator, couplings_of, operator_of, pad
+from refine.solvers.stencils import Singles, StencilOperator, data_weight, system_of
 
 MAX_ITERATIONS = 1000
 """Without the gradient term and with a large beta, hundreds are needed, and still faster than a direct solve."""
@@ -32,45 +30,31 @@ DAMPING = 0.6
 def solve_multigrid(problem: Problem, tolerance: float) -> LinearSolution:
     """Solve by CG (the exact form) or BiCGSTAB (the paper's), one V-cycle an application of the
     preconditioner."""
-    parts = couplings_of(problem)
-    operator = operator_of(parts, problem.form)
-    right_hand_side = parts.right_hand_side
-    reduced = eliminate_black(parts, COLOR_SCALE)
-    del parts  # the pixels' weights are in the operator and the reduced graph now
-    cycle = cycle_of(operator, *reduced)
-    del reduced
-    start = pad(problem.start, np.float64)
-    return krylov(operator, right_hand_side, start, tolerance, cycle, MAX_ITERATIONS)
-
-
-def cycle_of(operator: StencilOperator, elimination: Elimination, graph: Rows, excess: Singles) -> Cycle:
-    """The preconditioner for one form's operator, of what `eliminate_black` makes with `COLOR_SCALE`."""
-    return Cycle(operator, elimination, grid_hierarchy(elimination, graph, excess))
+    tau = data_weight(problem)
+    # The hierarchy first: while it is built, A and what belongs to it need not be there.
+    below = coarsen(problem, tau, COLOR_SCALE)
+    system = system_of(problem, tau)
+    return solve_iteratively(problem, system, tolerance, Cycle(system.operator, below), MAX_ITERATIONS)
 
 
 class Cycle:
     """The preconditioner: Jacobi with A, coarse correction, Jacobi with A; symmetric where A is."""
 
-    def __init__(self, operator: StencilOperator, elimination: Elimination, hierarchy: Hierarchy) -> None:
+    def __init__(self, operator: StencilOperator, below: Coarsening) -> None:
         self._operator = operator
-        self._elimination = elimination
-        self._hierarchy = hierarchy
-        self._step = DAMPING * operator.inverse_diagonal()
-        self._x, self._product = np.zeros_like(operator.tau), np.zeros_like(operator.tau)
-        self._left = np.zeros_like(operator.tau)
+        self._below = below
+        self._step = np.float32(DAMPING) * operator.inverse_diagonal()
+        self._x, self._left = np.zeros_like(operator.tau), np.zeros_like(operator.tau)
 
-    def __call__(self, residual: Singles) -> Singles:
-        """An approximate solution of A x = residual, padded; overwritten by the next call."""
-        x, product = self._x, self._product
+    def __call__(self, residual: Singles, out: Singles) -> None:
+        """An approximate solution of A x = residual, padded, into `out`."""
+        x, left = self._x, self._left
         _first(self._step, residual, x)
-        self._operator.apply(x, product)
-        _remainder(residual, product)
-        self._elimination.restrict(product, self._left)
-        correction = self._hierarchy.correct(self._left.ravel())
-        self._elimination.prolong(correction.reshape(x.shape), product, x)
-        self._operator.apply(x, product)
-        _smooth(self._step, residual, product, x)
-        return x
+        self._operator.remainder(residual, x, out)
+        self._below.elimination.restrict(out, left)
+        correction = self._below.hierarchy.correct(left.ravel())
+        self._below.elimination.prolong(correction.reshape(x.shape), out, x)
+        self._operator.smooth(residual, self._step, x, out)
 
 
 @njit(cache=True, parallel=True)
@@ -78,18 +62,3 @@ def _first(step, residual, x):
     for y in prange(x.shape[0]):
         for j in range(x.shape[1]):
             x[y, j] = step[y, j] * residual[y, j]
-
-
-@njit(cache=True, parallel=True)
-def _remainder(residual, product):
-    """residual - product, into product."""
-    for y in prange(product.shape[0]):
-        for j in range(product.shape[1]):
-            product[y, j] = residual[y, j] - product[y, j]
-
-
-@njit(cache=True, parallel=True)
-def _smooth(step, residual, product, x):
-    for y in prange(x.shape[0]):
-        for j in range(x.shape[1]):
-            x[y, j] += step[y, j] * (residual[y, j] - product[y, j])

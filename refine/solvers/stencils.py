@@ -11,6 +11,7 @@ which holds to rounding of the differences, however small tau is beside the coef
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,6 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from refine.solvers.linear import Problem, SolverError
-from refine.system import Form
 from refine.weights import NEIGHBORS, Floats
 
 MARGIN = 2
@@ -30,13 +30,16 @@ HALF = ((0, 1), (0, 2), *((dy, dx) for dy in (1, 2) for dx in range(-2, 3)))
 """One of each pair of opposite offsets in the 5x5 window: the planes of a symmetric 25-point operator."""
 _HALF = np.array(HALF)
 _AROUND = np.array(NEIGHBORS)
+_BAND = 64
 
 
 @dataclass(frozen=True)
 class Couplings:
-    """What the image, the confidence and the gradient say of a refinement, before either form is made of it.
+    """What the image, the confidence and the gradient say of some rows of a refinement, before either form is made
+    of it.
 
-    All planes padded by `MARGIN`.
+    All planes padded by `MARGIN`: at the sides by zeros, above and below by the rows there, or zeros at the
+    image's own border.
     """
 
     tau: Singles
@@ -48,8 +51,6 @@ class Couplings:
     term."""
     color: Singles
     """(H, W) beta (2 - phi_x - phi_y)."""
-    right_hand_side: Floats
-    """(H, W) b."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,19 @@ class StencilOperator:
 
     def apply(self, x: Grid, out: Grid) -> None:
         """A x into `out`; both padded, in float32 or float64."""
-        (_apply_symmetric if self.symmetric else _apply_one_sided)(self.planes, self.tau, x, out)
+        _apply(self.planes, self.tau, x, out)
+
+    def apply_against(self, x: Singles, other: Grid, out: Singles) -> tuple[float, float]:
+        """A x into `out`, and its products with another vector and with itself."""
+        return _apply_against(self.planes, self.tau, x, other, out)
+
+    def remainder(self, b: Grid, x: Grid, out: Grid) -> float:
+        """b - A x into `out`, worked out in the precision of `x`; its squared norm."""
+        return _remainder(self.planes, self.tau, b, x, out)
+
+    def smooth(self, b: Singles, step: Singles, x: Singles, out: Singles) -> None:
+        """x + step (b - A x) into `out`."""
+        _smooth(self.planes, self.tau, b, step, x, out)
 
     def inverse_diagonal(self) -> Singles:
         """1 / A_pp, 0 on the border.
@@ -86,6 +99,18 @@ class StencilOperator:
         return inverse
 
 
+@dataclass(frozen=True)
+class System:
+    """A x = b, seen from where the iterations begin."""
+
+    operator: StencilOperator
+    residual: Floats
+    """(H, W) b - A x, padded. In float64: across a step of a disparity it is thousands of times what the floor of the
+    confidence holds a pixel by."""
+    size: float
+    """|b|."""
+
+
 def pad(values: NDArray[Any], dtype: type = np.float32) -> NDArray[Any]:
     """An image or a stack of images with a border of zeros."""
     padded: NDArray[Any] = np.zeros(
@@ -100,124 +125,191 @@ def crop(padded: Grid) -> Grid:
     return padded[..., MARGIN:-MARGIN, MARGIN:-MARGIN]
 
 
-def couplings_of(problem: Problem) -> Couplings:
-    """Read the couplings off a refinement's inputs."""
+def bands(height: int) -> Iterator[tuple[int, int]]:
+    """The image a few rows at a time: what is made of its couplings needs them only while it is made."""
+    for first in range(0, height, _BAND):
+        yield first, min(first + _BAND, height)
+
+
+def data_weight(problem: Problem) -> Singles:
+    """tau, padded."""
+    return pad(np.maximum(problem.confidence, problem.parameters.confidence_floor))
+
+
+def couplings_of(problem: Problem, first: int = 0, last: int | None = None) -> Couplings:
+    """Read the couplings of these rows off a refinement's inputs; of all by default."""
     parameters = problem.parameters
     height, width = problem.shape
-    shape = (height + 2 * MARGIN, width + 2 * MARGIN)
+    last = height if last is None else last
+    shape = (last - first + 2 * MARGIN, width + 2 * MARGIN)
+    around = slice(max(0, first - MARGIN), last + MARGIN)
+    above = around.start - first + MARGIN
+    tau = np.zeros(shape, np.float32)
+    inside = tau[above:, MARGIN:-MARGIN][: min(height, around.stop) - around.start]
+    np.maximum(problem.confidence[around], parameters.confidence_floor, out=inside, casting="same_kind")
     made = Couplings(
-        tau=pad(np.maximum(problem.confidence, parameters.confidence_floor)),
+        tau=tau,
         weights=np.zeros((len(NEIGHBORS), *shape), np.float32),
         axial=np.zeros((2, *shape), np.float32),
         color=np.zeros(shape, np.float32),
-        right_hand_side=np.zeros(shape),
     )
+    phi = np.exp(np.arange(_differences_until(parameters.sigma_r)) * (-0.5 / parameters.sigma_r**2))
+    phi[-1] = 0
     _weigh(
-        np.ascontiguousarray(problem.image),
-        parameters.alpha,
-        parameters.beta,
-        0.5 / parameters.sigma_r**2,
+        problem.image,
+        problem.gradient,
+        first,
+        (parameters.alpha * phi).astype(np.float32),
+        (parameters.beta * (1 - phi)).astype(np.float32),
         made.weights,
         made.axial,
         made.color,
     )
-    _gather_right_hand_side(
-        np.ascontiguousarray(problem.disparity, np.float32),
-        np.ascontiguousarray(problem.gradient, np.float32),
-        made.tau,
-        made.axial,
-        made.right_hand_side,
-    )
     return made
 
 
-def operator_of(parts: Couplings, form: Form) -> StencilOperator:
-    """N + beta L' Phibar L, 25 points and symmetric, or the paper's N + beta Phibar L, 9 points."""
-    exact = form == "exact"
-    planes = np.zeros((len(HALF) if exact else len(NEIGHBORS), *parts.tau.shape), np.float32)
-    (_square if exact else _point)(parts.weights, parts.color, parts.axial, planes)
-    return StencilOperator(parts.tau, planes)
+def _differences_until(sigma_r: float) -> int:
+    """Up to this squared colour difference phi is more than nothing in float32."""
+    return min(int(210 * sigma_r**2), 3 * 255**2) + 2
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
-def _weigh(image, alpha, beta, falloff, weights, axial, color):
-    """`refine.weights.edge_weights` and `neighbor_weights`, alpha and beta put in."""
+def system_of(problem: Problem, tau: Singles) -> System:
+    """The system of a refinement: A is N + beta L' Phibar L, 25 points and symmetric, or the paper's N + beta Phibar
+    L, 9 points."""
+    exact = problem.form == "exact"
+    operator = StencilOperator(
+        tau, np.zeros((len(HALF) if exact else len(NEIGHBORS), *tau.shape), np.float32)
+    )
+    b = np.zeros(tau.shape)
+    for first, last in bands(problem.shape[0]):
+        parts = couplings_of(problem, first, last)
+        (_square if exact else _point)(parts.weights, parts.color, parts.axial, first, operator.planes)
+        _gather_right_hand_side(problem.disparity, problem.gradient, parts.tau, parts.axial, first, b)
+    size = float(np.linalg.norm(b))
+    operator.remainder(b, pad(problem.start, np.float64), b)
+    return System(operator, b, size)
+
+
+@njit(cache=True, fastmath={"contract"})
+def _exponential(t):
+    """exp of a float32 that is not positive, in operations that vectorise; 0 below -87."""
+    turns = np.floor(t * np.float32(1.44269504) + np.float32(0.5))
+    f = t - turns * np.float32(0.693359375) + turns * np.float32(2.12194440e-4)
+    series = np.float32(1 / 120) + f * np.float32(1 / 720)
+    series = np.float32(1 / 6) + f * (np.float32(1 / 24) + f * series)
+    series = np.float32(1) + f * (np.float32(1) + f * (np.float32(0.5) + f * series))
+    power = np.int32(np.int32(max(turns, np.float32(-126))) + np.int32(127))
+    return series * np.int32(power << np.int32(23)).view(np.float32) if t > np.float32(-87) else np.float32(0)
+
+
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def _weigh(image, gradient, first, axial_of, color_of, weights, axial, color):
+    """`refine.weights.edge_weights` and `neighbor_weights`, alpha and beta put in, for the rows from `first` on,
+    and two more above and below."""
     height, width = image.shape[:2]
+    rows = color.shape[0]
+    # Grey values as sums of three channels: integers up to 765, differences exact.
+    grey = np.zeros((rows + 2, width), np.int32)
+    for row in prange(rows + 2):
+        y = np.int64(row) + first - 3
+        if 0 <= y < height:
+            for x in range(width):
+                grey[row, x] = np.int32(image[y, x, 0]) + np.int32(image[y, x, 1]) + np.int32(image[y, x, 2])
+    for row in prange(rows):
+        y = np.int64(row) + first - 2
+        if 0 <= y < height:
+            _weigh_edges(image, gradient, y, axial_of, color_of, axial[:, row], color[row])
+            _weigh_neighbors(grey, row, y, height, weights)
+
+
+@njit(cache=True)
+def _weigh_edges(image, gradient, y, axial_of, color_of, axial, color):
+    height, width = image.shape[:2]
+    below = min(y + 1, height - 1)
+    last = axial_of.size - 1
+    for x in range(width):
+        right = min(x + 1, width - 1)
+        across = downwards = 0
+        for channel in range(3):
+            here = np.int32(image[y, x, channel])
+            across += (np.int32(image[y, right, channel]) - here) ** 2
+            downwards += (np.int32(image[below, x, channel]) - here) ** 2
+        across, downwards = min(across, last), min(downwards, last)
+        color[x + 2] = color_of[across] + color_of[downwards]
+        if x + 1 < width and np.isfinite(gradient[y, x, 0]):
+            axial[0, x + 2] = axial_of[across]
+        if y + 1 < height and np.isfinite(gradient[y, x, 1]):
+            axial[1, x + 2] = axial_of[downwards]
+
+
+@njit(cache=True, fastmath={"contract"})
+def _weigh_neighbors(grey, row, y, height, weights):
+    width = grey.shape[1]
     least = np.float32(-1 / math.log(0.01))
-    for y in prange(height):
-        squared = np.empty(8, np.float32)
+    squared = np.full((8, width), np.float32(1e30), np.float32)
+    total, total_squared = np.zeros(width, np.int32), np.zeros(width, np.int32)
+    nearest = np.full(width, np.float32(765 * 765), np.float32)
+    for k in range(8):
+        dy, dx = _AROUND[k, 0], _AROUND[k, 1]
+        if 0 <= y + dy < height:
+            begin, end = max(0, -dx), width - max(0, dx)
+            here, there = grey[row + 1, begin:end], grey[row + 1 + dy, begin + dx : end + dx]
+            squares, sums, sums_squared = squared[k, begin:end], total[begin:end], total_squared[begin:end]
+            smallest = nearest[begin:end]
+            for x in range(here.size):
+                difference = there[x] - here[x]
+                sums[x] += difference
+                sums_squared[x] += difference * difference
+                squares[x] = difference * difference
+                smallest[x] = min(smallest[x], squares[x])
+    tall = 1 + (y > 0) + (y + 1 < height)
+    sharpness, normaliser = np.empty(width, np.float32), np.zeros(width, np.float32)
+    for x in range(width):
+        count = np.int32(tall * (1 + (x > 0) + (x + 1 < width)))
+        spread = np.float32(count * total_squared[x] - total[x] * total[x])
+        variance = spread / np.float32(count * count)
+        scale = max(np.float32(0.6) * variance, least * nearest[x], np.float32(2e-6 * 765 * 765))
+        sharpness[x] = np.float32(-1) / scale
+    for k in range(8):
+        squares = squared[k]
         for x in range(width):
-            right, below = min(x + 1, width - 1), min(y + 1, height - 1)
-            across = downwards = 0
-            for channel in range(3):
-                here = np.int32(image[y, x, channel])
-                across += (np.int32(image[y, right, channel]) - here) ** 2
-                downwards += (np.int32(image[below, x, channel]) - here) ** 2
-            phi_x, phi_y = math.exp(-falloff * across), math.exp(-falloff * downwards)
-            color[y + 2, x + 2] = beta * (2 - phi_x - phi_y)
-            if x + 1 < width:
-                axial[0, y + 2, x + 2] = alpha * phi_x
-            if y + 1 < height:
-                axial[1, y + 2, x + 2] = alpha * phi_y
-            # Grey values as sums of three channels: integers up to 765, differences exact.
-            grey = np.int32(image[y, x, 0]) + np.int32(image[y, x, 1]) + np.int32(image[y, x, 2])
-            count, total, total_squared, nearest = 1, 0, 0, 765 * 765
-            for k in range(8):
-                v, u = y + _AROUND[k, 0], x + _AROUND[k, 1]
-                squared[k] = -1
-                if 0 <= v < height and 0 <= u < width:
-                    difference = (
-                        np.int32(image[v, u, 0]) + np.int32(image[v, u, 1]) + np.int32(image[v, u, 2]) - grey
-                    )
-                    count += 1
-                    total += difference
-                    total_squared += difference * difference
-                    nearest = min(nearest, difference * difference)
-                    squared[k] = difference * difference
-            variance = np.float32((count * total_squared - total * total) / (count * count))
-            scale = max(np.float32(0.6) * variance, least * nearest, np.float32(2e-6 * 765 * 765))
-            sharpness = -1 / scale
-            normaliser = np.float32(0)
-            for k in range(8):
-                if squared[k] >= 0:
-                    squared[k] = math.exp(squared[k] * sharpness)
-                    normaliser += squared[k]
-            for k in range(8):
-                if squared[k] > 0:
-                    weights[k, y + 2, x + 2] = squared[k] / normaliser
+            squares[x] = _exponential(squares[x] * sharpness[x])
+            normaliser[x] += squares[x]
+    for x in range(width):
+        normaliser[x] = np.float32(1) / normaliser[x] if normaliser[x] > 0 else np.float32(0)
+    for k in range(8):
+        out, squares = weights[k, row], squared[k]
+        for x in range(width):
+            out[x + 2] = squares[x] * normaliser[x]
 
 
 @njit(cache=True, parallel=True)
-def _gather_right_hand_side(disparity, gradient, tau, axial, right_hand_side):
-    """b = T D + C' (alpha Phi) G; also drops the gradient terms whose G is not finite from `axial`."""
-    height, width = disparity.shape
-    for y in prange(height):
+def _gather_right_hand_side(disparity, gradient, tau, axial, first, right_hand_side):
+    """b = T D + C' (alpha Phi) G, of some rows."""
+    width = disparity.shape[1]
+    for row in prange(tau.shape[0] - 4):
+        y = np.int64(row) + first
         for x in range(width):
-            for channel in range(2):
-                if not np.isfinite(gradient[y, x, channel]):
-                    axial[channel, y + 2, x + 2] = 0
-    for y in prange(height):
-        for x in range(width):
-            value = tau[y + 2, x + 2] * np.float64(disparity[y, x])
+            value = tau[row + 2, x + 2] * np.float64(disparity[y, x])
             for channel in range(2):
                 back_y, back_x = channel, 1 - channel
-                weight = axial[channel, y + 2, x + 2]
+                weight = axial[channel, row + 2, x + 2]
                 if weight > 0:
                     value -= weight * np.float64(gradient[y, x, channel])
-                weight = axial[channel, y + 2 - back_y, x + 2 - back_x]
+                weight = axial[channel, row + 2 - back_y, x + 2 - back_x]
                 if weight > 0:
                     value += weight * np.float64(gradient[y - back_y, x - back_x, channel])
             right_hand_side[y + 2, x + 2] = value
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _square(weights, color, axial, planes):
-    """Off-diagonal planes of N + L' Phi L: sum over the centres s that see both p and p + o."""
+def _square(weights, color, axial, first, planes):
+    """Off-diagonal planes of N + L' Phi L, of some rows: sum over the centres s that see both p and p + o."""
     height, width = color.shape[0] - 4, color.shape[1] - 4
     for y in prange(height):
         for k in range(12):
             dy, dx = _HALF[k, 0], _HALF[k, 1]
-            row = planes[k, y + 2]
+            row = planes[k, first + y + 2]
             for sy in range(max(-1, dy - 1), min(1, dy + 1) + 1):
                 for sx in range(max(-1, dx - 1), min(1, dx + 1) + 1):
                     # Seen from s: p lies at -(sy, sx), p + o at (dy - sy, dx - sx).
@@ -237,8 +329,8 @@ def _square(weights, color, axial, planes):
                         for x in range(width):
                             row[x + 2] += strength[x] * one[x] * other[x]
         for x in range(width):
-            planes[0, y + 2, x + 2] -= axial[0, y + 2, x + 2]
-            planes[4, y + 2, x + 2] -= axial[1, y + 2, x + 2]
+            planes[0, first + y + 2, x + 2] -= axial[0, y + 2, x + 2]
+            planes[4, first + y + 2, x + 2] -= axial[1, y + 2, x + 2]
 
 
 @njit(cache=True)
@@ -251,16 +343,16 @@ def _place(dy, dx):
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def _point(weights, color, axial, planes):
+def _point(weights, color, axial, first, planes):
     height, width = color.shape[0] - 4, color.shape[1] - 4
     for y in prange(height):
         for x in range(width):
             for k in range(8):
-                planes[k, y + 2, x + 2] = -color[y + 2, x + 2] * weights[k, y + 2, x + 2]
-            planes[1, y + 2, x + 2] -= axial[1, y + 1, x + 2]
-            planes[3, y + 2, x + 2] -= axial[0, y + 2, x + 1]
-            planes[4, y + 2, x + 2] -= axial[0, y + 2, x + 2]
-            planes[6, y + 2, x + 2] -= axial[1, y + 2, x + 2]
+                planes[k, first + y + 2, x + 2] = -color[y + 2, x + 2] * weights[k, y + 2, x + 2]
+            planes[1, first + y + 2, x + 2] -= axial[1, y + 1, x + 2]
+            planes[3, first + y + 2, x + 2] -= axial[0, y + 2, x + 1]
+            planes[4, first + y + 2, x + 2] -= axial[0, y + 2, x + 2]
+            planes[6, first + y + 2, x + 2] -= axial[1, y + 2, x + 2]
 
 
 @njit(cache=True, fastmath={"contract"})
@@ -270,34 +362,85 @@ def _both(a, k, x, c, y, j, dy, dx):
     return ahead + a[k, y + 2 - dy, j + 2 - dx] * (x[y + 2 - dy, j + 2 - dx] - c)
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
-def _apply_symmetric(a, tau, x, out):
-    height, width = tau.shape[0] - 4, tau.shape[1] - 4
-    for y in prange(height):
-        for j in range(width):
-            c = x[y + 2, j + 2]
-            s = tau[y + 2, j + 2] * c
-            s += _both(a, 0, x, c, y, j, 0, 1) + _both(a, 1, x, c, y, j, 0, 2)
-            s += _both(a, 2, x, c, y, j, 1, -2) + _both(a, 3, x, c, y, j, 1, -1)
-            s += _both(a, 4, x, c, y, j, 1, 0) + _both(a, 5, x, c, y, j, 1, 1)
-            s += _both(a, 6, x, c, y, j, 1, 2) + _both(a, 7, x, c, y, j, 2, -2)
-            s += _both(a, 8, x, c, y, j, 2, -1) + _both(a, 9, x, c, y, j, 2, 0)
-            s += _both(a, 10, x, c, y, j, 2, 1) + _both(a, 11, x, c, y, j, 2, 2)
-            out[y + 2, j + 2] = s
+@njit(cache=True, fastmath={"contract"})
+def _symmetric_row(a, tau, x, y, out):
+    for j in range(tau.shape[1] - 4):
+        c = x[y + 2, j + 2]
+        s = tau[y + 2, j + 2] * c
+        s += _both(a, 0, x, c, y, j, 0, 1) + _both(a, 1, x, c, y, j, 0, 2)
+        s += _both(a, 2, x, c, y, j, 1, -2) + _both(a, 3, x, c, y, j, 1, -1)
+        s += _both(a, 4, x, c, y, j, 1, 0) + _both(a, 5, x, c, y, j, 1, 1)
+        s += _both(a, 6, x, c, y, j, 1, 2) + _both(a, 7, x, c, y, j, 2, -2)
+        s += _both(a, 8, x, c, y, j, 2, -1) + _both(a, 9, x, c, y, j, 2, 0)
+        s += _both(a, 10, x, c, y, j, 2, 1) + _both(a, 11, x, c, y, j, 2, 2)
+        out[j + 2] = s
+
+
+@njit(cache=True, fastmath={"contract"})
+def _one_sided_row(a, tau, x, y, out):
+    for j in range(tau.shape[1] - 4):
+        c = x[y + 2, j + 2]
+        s = tau[y + 2, j + 2] * c
+        s += a[0, y + 2, j + 2] * (x[y + 1, j + 1] - c) + a[1, y + 2, j + 2] * (x[y + 1, j + 2] - c)
+        s += a[2, y + 2, j + 2] * (x[y + 1, j + 3] - c) + a[3, y + 2, j + 2] * (x[y + 2, j + 1] - c)
+        s += a[4, y + 2, j + 2] * (x[y + 2, j + 3] - c) + a[5, y + 2, j + 2] * (x[y + 3, j + 1] - c)
+        s += a[6, y + 2, j + 2] * (x[y + 3, j + 2] - c) + a[7, y + 2, j + 2] * (x[y + 3, j + 3] - c)
+        out[j + 2] = s
+
+
+@njit(cache=True)
+def _row(a, tau, x, y, out):
+    """Row y of A x into a padded row."""
+    if a.shape[0] == 12:
+        _symmetric_row(a, tau, x, y, out)
+    else:
+        _one_sided_row(a, tau, x, y, out)
+
+
+@njit(cache=True, parallel=True)
+def _apply(a, tau, x, out):
+    for y in prange(tau.shape[0] - 4):
+        _row(a, tau, x, y, out[y + 2])
+
+
+@njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
+def _apply_against(a, tau, x, other, out):
+    product = norm = 0.0
+    for y in prange(tau.shape[0] - 4):
+        row, against = out[y + 2], other[y + 2]
+        _row(a, tau, x, y, row)
+        row_product = row_norm = 0.0
+        for j in range(row.size):
+            row_product += np.float64(row[j]) * np.float64(against[j])
+            row_norm += np.float64(row[j]) * np.float64(row[j])
+        product += row_product
+        norm += row_norm
+    return product, norm
+
+
+@njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
+def _remainder(a, tau, b, x, out):
+    norm = 0.0
+    for y in prange(tau.shape[0] - 4):
+        product = np.zeros(tau.shape[1], x.dtype)
+        _row(a, tau, x, y, product)
+        row, aim = out[y + 2], b[y + 2]
+        row_norm = 0.0
+        for j in range(row.size):
+            row[j] = aim[j] - product[j]
+            row_norm += np.float64(row[j]) * np.float64(row[j])
+        norm += row_norm
+    return norm
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
-def _apply_one_sided(a, tau, x, out):
-    height, width = tau.shape[0] - 4, tau.shape[1] - 4
-    for y in prange(height):
-        for j in range(width):
-            c = x[y + 2, j + 2]
-            s = tau[y + 2, j + 2] * c
-            s += a[0, y + 2, j + 2] * (x[y + 1, j + 1] - c) + a[1, y + 2, j + 2] * (x[y + 1, j + 2] - c)
-            s += a[2, y + 2, j + 2] * (x[y + 1, j + 3] - c) + a[3, y + 2, j + 2] * (x[y + 2, j + 1] - c)
-            s += a[4, y + 2, j + 2] * (x[y + 2, j + 3] - c) + a[5, y + 2, j + 2] * (x[y + 3, j + 1] - c)
-            s += a[6, y + 2, j + 2] * (x[y + 3, j + 2] - c) + a[7, y + 2, j + 2] * (x[y + 3, j + 3] - c)
-            out[y + 2, j + 2] = s
+def _smooth(a, tau, b, step, x, out):
+    for y in prange(tau.shape[0] - 4):
+        row = out[y + 2]
+        _row(a, tau, x, y, row)
+        here, aim, steps = x[y + 2], b[y + 2], step[y + 2]
+        for j in range(row.size):
+            row[j] = here[j] + steps[j] * (aim[j] - row[j])
 
 
 @njit(cache=True, parallel=True)
