@@ -25,8 +25,8 @@ class Ours(Method):
     search: ClassVar = {
         "parameters.sigma_r": (1.0, 1.7, 2.55, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0, 25.0, 40.0),
         "shape.power": (0.5, 1.0, 2.0, 3.0, 4.0),
-        "parameters.alpha": (3.0, 10.0, 30.0, 100.0, 300.0),
-        "parameters.beta": (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0),
+        "parameters.alpha": (3.0, 10.0, 30.0, 50.0, 100.0, 300.0),
+        "parameters.beta": (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0),
         "shape.temperature": (0.5, 0.7, 1.0, 1.5),
         "parameters.confidence_floor": (1e-5, 1e-4, 1e-3, 3e-3, 1e-2),
     }
