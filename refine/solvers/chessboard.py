@@ -17,12 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
+from numpy.typing import NDArray
 
 from refine.solvers.hierarchy import Hierarchy, build_hierarchy
 from refine.solvers.linear import Problem
 from refine.solvers.rows import Indices, Rows
 from refine.solvers.stencils import Singles, bands, couplings_of
-from refine.solvers.windows import DAMPING
+from refine.solvers.windows import DAMPING, narrowed, widened
 
 STRONGER = np.float32(3)
 """Times as strong as what it stands for, the coupling of a detour has to be."""
@@ -38,35 +39,37 @@ class Elimination:
 
     tau: Singles
     """(H, W) the M-matrix's excess."""
-    ties: Singles
-    """(4, H, W) its couplings to the right, downwards, down right, and of the pixel to the right to the one below."""
-    inverse: Singles
-    """(H, W) 1 / diagonal at eliminated pixels, 0 elsewhere."""
+    ties: NDArray[np.uint16]
+    """(4, H, W) its couplings to the right, downwards, down right, and of the pixel to the right to the one below,
+    in bfloat16 (`refine.solvers.windows`): all below is made of the rounded ones."""
+    relax: Singles
+    """(H, W) 1 / diagonal at eliminated pixels. At the others minus `DAMPING` / diagonal of what is left, once that
+    is known, and 0 before."""
 
     def restrict(self, residual: Singles, out: Singles) -> None:
         """The right-hand side of the pixels that are left, for a residual of all. At the others `out` means
         nothing."""
-        _restrict(self.ties, self.inverse, residual, out)
+        _restrict(self.ties, self.relax, residual, out)
 
     def prolong(self, left: Singles, residual: Singles, x: Singles) -> None:
         """Add to `x` the solution for this residual that is `left` on the pixels that are left."""
-        _prolong(self.ties, self.inverse, left, residual, x)
+        _prolong(self.ties, self.relax, left, residual, x)
 
     def graph(self) -> tuple[Rows, Singles, Indices]:
         """Couplings and excess (`refine.solvers.hierarchy`) of the pixels that are left, and which they are."""
         number = np.full(self.tau.shape, -1, np.int32)
         inside = number[2:-2, 2:-2]
-        left = self.inverse[2:-2, 2:-2] == 0
+        left = self.relax[2:-2, 2:-2] <= 0
         inside[left] = np.arange(np.count_nonzero(left), dtype=np.int32)
         start = np.zeros(np.count_nonzero(left) + 1, np.int32)
         planes = np.zeros((6, *number.shape), np.float32)
-        _connect(self.ties, self.inverse, planes)
+        _connect(self.ties, self.relax, planes)
         _count(planes, number, start)
         np.cumsum(start, out=start)
         column, value = np.empty(start[-1], np.int32), np.empty(start[-1], np.float32)
         excess = np.empty(start.size - 1, np.float32)
         _list(planes, number, start, column, value)
-        _hold(self.tau, self.ties, self.inverse, number, excess)
+        _hold(self.tau, self.ties, self.relax, number, excess)
         return Rows(start, column, value), excess, np.flatnonzero(number >= 0).astype(np.int32)
 
 
@@ -79,18 +82,18 @@ class GridSmoother:
     """
 
     elimination: Elimination
-    step: Singles
-    """`DAMPING` / diagonal; 0 at pixels that are eliminated."""
+
+    @property
+    def size(self) -> int:
+        return self.elimination.tau.size
 
     def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
         of, shape = self.elimination, self.elimination.tau.shape
-        step, b, x, left = (vector.reshape(shape) for vector in (self.step, b, x, left))
-        _from_zero(of.tau, of.ties, of.inverse, step, b, x, left)
+        _from_zero(of.tau, of.ties, of.relax, b.reshape(shape), x.reshape(shape), left.reshape(shape))
 
     def again(self, b: Singles, x: Singles, out: Singles) -> None:
         of, shape = self.elimination, self.elimination.tau.shape
-        step, b, x, out = (vector.reshape(shape) for vector in (self.step, b, x, out))
-        _again(of.tau, of.ties, of.inverse, step, b, x, out)
+        _again(of.tau, of.ties, of.relax, b.reshape(shape), x.reshape(shape), out.reshape(shape))
 
 
 @dataclass(frozen=True)
@@ -112,9 +115,8 @@ def grid_hierarchy(elimination: Elimination) -> Hierarchy:
     """The hierarchy below the image for vectors that are padded images, flat."""
 
     def arrange(graph: Rows, excess: Singles, place: Indices) -> GridSmoother:
-        step = np.zeros(elimination.tau.size, np.float32)
-        _invert(graph.start, graph.value, excess, place, step)
-        return GridSmoother(elimination, step)
+        _invert(graph.start, graph.value, excess, place, elimination.relax.ravel())
+        return GridSmoother(elimination)
 
     return build_hierarchy(elimination.graph, arrange)
 
@@ -125,15 +127,17 @@ def eliminate_black(problem: Problem, tau: Singles, color_scale: float) -> Elimi
     That has data and gradient terms as they are, and for the colour term the graph Laplacian with couplings
     color_scale (color_p w_pq + color_q w_qp).
     """
-    ties, inverse = np.zeros((4, *tau.shape), np.float32), np.zeros_like(tau)
+    ties = np.zeros((4, *tau.shape), np.float32)
     for first, last in bands(problem.shape[0]):
         parts = couplings_of(problem, first, last)
         _tie(parts.weights, parts.color, parts.axial, np.float32(color_scale), first, ties)
     side = np.full(tau.shape, _NOWHERE, np.int8)
     _detours(ties, side)
     _take_over(side, ties)
-    _choose(tau, ties, inverse)
-    return Elimination(tau, ties, inverse)
+    rounded, relax = np.empty(ties.shape, np.uint16), np.zeros_like(tau)
+    _round(ties, rounded)
+    _choose(tau, rounded, relax)
+    return Elimination(tau, rounded, relax)
 
 
 @njit(cache=True, parallel=True)
@@ -207,37 +211,47 @@ def _take_over(side, ties):
 
 
 @njit(cache=True, parallel=True)
-def _choose(tau, ties, inverse):
+def _round(ties, rounded):
+    for y in prange(ties.shape[1]):
+        for k in range(4):
+            for x in range(ties.shape[2]):
+                rounded[k, y, x] = narrowed(ties[k, y, x])
+
+
+@njit(cache=True, parallel=True)
+def _choose(tau, ties, relax):
     """1 / diagonal at the black pixels that no other is coupled to: those to be eliminated."""
     height, width = tau.shape[0] - 4, tau.shape[1] - 4
     for row in prange(height):
         y = np.int64(row) + 2
         for x in range(3 - y % 2, width + 2, 2):
-            held = tau[y, x] + ties[0, y, x] + ties[0, y, x - 1] + ties[1, y, x] + ties[1, y - 1, x]
-            diagonal = max(
-                max(ties[2, y, x], ties[2, y - 1, x - 1]), max(ties[3, y, x - 1], ties[3, y - 1, x])
-            )
+            held = tau[y, x] + widened(ties[0, y, x]) + widened(ties[0, y, x - 1])
+            held += widened(ties[1, y, x]) + widened(ties[1, y - 1, x])
+            diagonal = ties[2, y, x] | ties[2, y - 1, x - 1] | ties[3, y, x - 1] | ties[3, y - 1, x]
             if diagonal == 0 and held > _LEAST:
-                inverse[y, x] = 1 / held
+                relax[y, x] = 1 / held
 
 
 @njit(cache=True, parallel=True)
-def _connect(ties, inverse, planes):
+def _connect(ties, relax, planes):
     """What couples the pixels that are left, square by square, (y, x) upper left."""
-    for row in prange(inverse.shape[0] - 4):
+    none = np.float32(0)
+    for row in prange(relax.shape[0] - 4):
         y = np.int64(row) + 2
-        for x in range(2, inverse.shape[1] - 2):
-            top, bottom = ties[0, y, x], ties[0, y + 1, x]
-            left, right = ties[1, y, x], ties[1, y, x + 1]
-            planes[0, y, x] = top if max(inverse[y, x], inverse[y, x + 1]) == 0 else 0
-            planes[3, y, x] = left if max(inverse[y, x], inverse[y + 1, x]) == 0 else 0
-            planes[1, y, x] = top * inverse[y, x + 1] * ties[0, y, x + 1]
-            planes[5, y, x] = left * inverse[y + 1, x] * ties[1, y + 1, x]
-            planes[4, y, x], planes[2, y, x + 1] = ties[2, y, x], ties[3, y, x]
+        for x in range(2, relax.shape[1] - 2):
+            top, bottom = widened(ties[0, y, x]), widened(ties[0, y + 1, x])
+            left, right = widened(ties[1, y, x]), widened(ties[1, y, x + 1])
+            here, beside = max(relax[y, x], none), max(relax[y, x + 1], none)
+            below, beyond = max(relax[y + 1, x], none), max(relax[y + 1, x + 1], none)
+            planes[0, y, x] = top if max(here, beside) == 0 else none
+            planes[3, y, x] = left if max(here, below) == 0 else none
+            planes[1, y, x] = top * beside * widened(ties[0, y, x + 1])
+            planes[5, y, x] = left * below * widened(ties[1, y + 1, x])
+            planes[4, y, x], planes[2, y, x + 1] = widened(ties[2, y, x]), widened(ties[3, y, x])
             if (y + x) % 2 == 0:  # Black are the upper right and the lower left.
-                planes[4, y, x] += top * inverse[y, x + 1] * right + left * inverse[y + 1, x] * bottom
+                planes[4, y, x] += top * beside * right + left * below * bottom
             else:
-                planes[2, y, x + 1] += top * inverse[y, x] * left + right * inverse[y + 1, x + 1] * bottom
+                planes[2, y, x + 1] += top * here * left + right * beyond * bottom
 
 
 @njit(cache=True)
@@ -274,100 +288,111 @@ def _list(planes, number, start, column, value):
 
 
 @njit(cache=True, parallel=True)
-def _invert(start, value, excess, place, step):
-    """DAMPING / diagonal."""
+def _invert(start, value, excess, place, relax):
+    """-DAMPING / diagonal."""
     for i in prange(place.size):
         held = np.float64(excess[i])
         for e in range(start[i], start[i + 1]):
             held += value[e]
-        step[place[i]] = DAMPING / np.float32(held) if held > 0 else 0
+        relax[place[i]] = -DAMPING / np.float32(held) if held > 0 else 0
 
 
-@njit(cache=True)
-def _gathered(ties, inverse, values, y, x):
-    """What the eliminated pixels beside (y, x) pass on to it."""
-    return (
-        ties[0, y, x] * inverse[y, x + 1] * values[y, x + 1]
-        + ties[0, y, x - 1] * inverse[y, x - 1] * values[y, x - 1]
-        + ties[1, y, x] * inverse[y + 1, x] * values[y + 1, x]
-        + ties[1, y - 1, x] * inverse[y - 1, x] * values[y - 1, x]
-    )
+# Below, a pixel is (y + 2, j + 2): an index like `j - 1` may be negative for all that LLVM knows, and keeps it from
+# vectorising.
+
+
+@njit(cache=True, fastmath={"contract"})
+def _gathered(ties, relax, values, y, j):
+    """What the eliminated pixels beside a pixel pass on to it."""
+    none = np.float32(0)
+    across = widened(ties[0, y + 2, j + 2]) * max(relax[y + 2, j + 3], none) * values[y + 2, j + 3]
+    across += widened(ties[0, y + 2, j + 1]) * max(relax[y + 2, j + 1], none) * values[y + 2, j + 1]
+    down = widened(ties[1, y + 2, j + 2]) * max(relax[y + 3, j + 2], none) * values[y + 3, j + 2]
+    down += widened(ties[1, y + 1, j + 2]) * max(relax[y + 1, j + 2], none) * values[y + 1, j + 2]
+    return across + down
 
 
 @njit(cache=True, parallel=True)
-def _hold(tau, ties, inverse, number, excess):
-    for row in prange(number.shape[0] - 4):
-        y = np.int64(row) + 2
-        for x in range(2, number.shape[1] - 2):
-            if number[y, x] >= 0:
-                excess[number[y, x]] = tau[y, x] + _gathered(ties, inverse, tau, y, x)
+def _hold(tau, ties, relax, number, excess):
+    for y in prange(number.shape[0] - 4):
+        for x in range(number.shape[1] - 4):
+            if number[y + 2, x + 2] >= 0:
+                excess[number[y + 2, x + 2]] = tau[y + 2, x + 2] + _gathered(ties, relax, tau, y, x)
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
-def _restrict(ties, inverse, residual, out):
+def _restrict(ties, relax, residual, out):
     height, width = residual.shape[0] - 4, residual.shape[1] - 4
     for y in prange(height):
-        for x in range(width):
-            out[y + 2, x + 2] = residual[y + 2, x + 2] + _gathered(ties, inverse, residual, y + 2, x + 2)
+        for j in range(width):
+            out[y + 2, j + 2] = residual[y + 2, j + 2] + _gathered(ties, relax, residual, y, j)
 
 
 @njit(cache=True, fastmath={"contract"})
 def _beside(ties, x, y, j):
-    """The sum over the couplings of (y + 2, j + 2) to the four pixels beside it. Written with `y + 2 - 1`: an index
-    that may be negative keeps LLVM from vectorising."""
-    total = ties[0, y + 2, j + 2] * x[y + 2, j + 3] + ties[0, y + 2, j + 1] * x[y + 2, j + 1]
-    return total + ties[1, y + 2, j + 2] * x[y + 3, j + 2] + ties[1, y + 1, j + 2] * x[y + 1, j + 2]
+    """The sum over a pixel's couplings to the four beside it."""
+    total = (
+        widened(ties[0, y + 2, j + 2]) * x[y + 2, j + 3] + widened(ties[0, y + 2, j + 1]) * x[y + 2, j + 1]
+    )
+    total += widened(ties[1, y + 2, j + 2]) * x[y + 3, j + 2]
+    return total + widened(ties[1, y + 1, j + 2]) * x[y + 1, j + 2]
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
-def _prolong(ties, inverse, left, residual, x):
+def _prolong(ties, relax, left, residual, x):
     height, width = residual.shape[0] - 4, residual.shape[1] - 4
     for y in prange(height):
         for j in range(width):
-            held = inverse[y + 2, j + 2]
+            held = relax[y + 2, j + 2]
             through = held * (residual[y + 2, j + 2] + _beside(ties, left, y, j))
-            x[y + 2, j + 2] += left[y + 2, j + 2] if held == 0 else through
+            x[y + 2, j + 2] += through if held > 0 else left[y + 2, j + 2]
 
 
-@njit(cache=True, fastmath={"contract"})
-def _fill_row(ties, inverse, x, y):
-    """Put in what eliminated pixels have for a residual of 0. They lie between pixels that are left only."""
-    for j in range(inverse.shape[1] - 4):
-        held = inverse[y + 2, j + 2]
-        x[y + 2, j + 2] = x[y + 2, j + 2] if held == 0 else held * _beside(ties, x, y, j)
+@njit(cache=True, parallel=True, fastmath={"contract"})
+def _fill(ties, relax, x):
+    """Put in what eliminated pixels have for a residual of 0. They lie between pixels that are left only, so none
+    reads what is put in here."""
+    height, width = relax.shape[0] - 4, relax.shape[1] - 4
+    for y in prange(height):
+        row = np.empty(width, np.float32)
+        for j in range(width):
+            held = relax[y + 2, j + 2]
+            row[j] = held * _beside(ties, x, y, j) if held > 0 else x[y + 2, j + 2]
+        x[y + 2, 2:-2] = row
 
 
 @njit(cache=True, fastmath={"contract"})
 def _remainder(tau, ties, b, x, y, j):
-    """b - M x at (y + 2, j + 2), from differences."""
+    """b - M x, from differences."""
     c = x[y + 2, j + 2]
     total = b[y + 2, j + 2] - tau[y + 2, j + 2] * c
-    total += ties[0, y + 2, j + 2] * (x[y + 2, j + 3] - c) + ties[0, y + 2, j + 1] * (x[y + 2, j + 1] - c)
-    total += ties[1, y + 2, j + 2] * (x[y + 3, j + 2] - c) + ties[1, y + 1, j + 2] * (x[y + 1, j + 2] - c)
-    total += ties[2, y + 2, j + 2] * (x[y + 3, j + 3] - c) + ties[2, y + 1, j + 1] * (x[y + 1, j + 1] - c)
-    return (
-        total + ties[3, y + 2, j + 1] * (x[y + 3, j + 1] - c) + ties[3, y + 1, j + 2] * (x[y + 1, j + 3] - c)
-    )
+    total += widened(ties[0, y + 2, j + 2]) * (x[y + 2, j + 3] - c)
+    total += widened(ties[0, y + 2, j + 1]) * (x[y + 2, j + 1] - c)
+    total += widened(ties[1, y + 2, j + 2]) * (x[y + 3, j + 2] - c)
+    total += widened(ties[1, y + 1, j + 2]) * (x[y + 1, j + 2] - c)
+    total += widened(ties[2, y + 2, j + 2]) * (x[y + 3, j + 3] - c)
+    total += widened(ties[2, y + 1, j + 1]) * (x[y + 1, j + 1] - c)
+    total += widened(ties[3, y + 2, j + 1]) * (x[y + 3, j + 1] - c)
+    return total + widened(ties[3, y + 1, j + 2]) * (x[y + 1, j + 3] - c)
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
-def _from_zero(tau, ties, inverse, step, b, x, left):
+def _from_zero(tau, ties, relax, b, x, left):
     height, width = tau.shape[0] - 4, tau.shape[1] - 4
     for y in prange(height):
         for j in range(width):
-            x[y + 2, j + 2] = step[y + 2, j + 2] * b[y + 2, j + 2]
-    for y in prange(height):
-        _fill_row(ties, inverse, x, y)
+            x[y + 2, j + 2] = min(relax[y + 2, j + 2], np.float32(0)) * -b[y + 2, j + 2]
+    _fill(ties, relax, x)
     for y in prange(height):
         for j in range(width):
             left[y + 2, j + 2] = _remainder(tau, ties, b, x, y, j)
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
-def _again(tau, ties, inverse, step, b, x, out):
+def _again(tau, ties, relax, b, x, out):
     height, width = tau.shape[0] - 4, tau.shape[1] - 4
-    for y in prange(height):
-        _fill_row(ties, inverse, x, y)
+    _fill(ties, relax, x)
     for y in prange(height):
         for j in range(width):
-            out[y + 2, j + 2] = x[y + 2, j + 2] + step[y + 2, j + 2] * _remainder(tau, ties, b, x, y, j)
+            step = min(relax[y + 2, j + 2], np.float32(0))
+            out[y + 2, j + 2] = x[y + 2, j + 2] - step * _remainder(tau, ties, b, x, y, j)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
@@ -27,14 +29,23 @@ def interpolation(
     return Rows(start, column, value), coarse
 
 
-def coarse_graph(
+@dataclass(frozen=True)
+class Pieces:
+    """Couplings by rows in parts, so that those of the level above need not be there when they are put together."""
+
+    start: Indices
+    columns: list[Indices]
+    values: list[Singles]
+
+
+def galerkin_pieces(
     graph: Rows,
     diagonal: Singles,
     excess: Singles,
     prolong: Rows,
     coarse: int,
     bounds: NDArray[np.int64],
-) -> tuple[Rows, Singles]:
+) -> tuple[Pieces, Singles]:
     """P' M P as couplings and excess. The bounds say which of its rows are made side by side."""
     restrict = _transposed(prolong, coarse)
     start, next_excess = np.zeros(coarse + 1, np.int32), np.empty(coarse, np.float32)
@@ -44,9 +55,17 @@ def coarse_graph(
         *of(graph), diagonal, excess, sums, *of(prolong), most, *of(restrict), bounds, start, next_excess
     )
     np.cumsum(start, out=start)
-    column = np.concatenate([piece[0] for piece in pieces])
-    value = np.concatenate([piece[1] for piece in pieces])
-    return Rows(start, column, value), next_excess
+    columns, values = zip(*pieces, strict=True)
+    return Pieces(start, list(columns), list(values)), next_excess
+
+
+def joined(pieces: Pieces) -> Rows:
+    """The couplings; the pieces are emptied."""
+    column = np.concatenate(pieces.columns)
+    pieces.columns.clear()
+    value = np.concatenate(pieces.values)
+    pieces.values.clear()
+    return Rows(pieces.start, column, value)
 
 
 def _transposed(rows: Rows, columns: int) -> Rows:

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.solvers.galerkin import coarse_graph, interpolation
+from refine.solvers.galerkin import galerkin_pieces, interpolation, joined
 from refine.solvers.rows import Indices, Rows, of
 from refine.solvers.splitting import lead_with_strong, split
 from refine.solvers.stencils import Singles
@@ -46,8 +46,8 @@ class Smoother(Protocol):
     """One step of damped Jacobi on a level's M-matrix. Vectors are flat."""
 
     @property
-    def step(self) -> Singles:
-        """Damping over the diagonal, 0 where that is 0."""
+    def size(self) -> int:
+        """Of the level's vectors."""
 
     def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
         """A step from 0 into `x`, and b - M x into `left`."""
@@ -113,13 +113,16 @@ def build_hierarchy(first: Callable[[], tuple[Rows, Singles, Indices]], arrange:
         ends, state = lead_with_strong(*of(graph), diagonal, STRENGTH, LOOSE)
         split(graph.start, graph.column, ends, state, _bounds(state.size))
         prolong, coarse = interpolation(graph, diagonal, excess, ends, state)
-        del ends
-        graph, excess = coarse_graph(graph, diagonal, excess, prolong, coarse, _bounds(coarse))
-        kept = coarse / state.size
+        del ends, state
+        pieces, excess = galerkin_pieces(graph, diagonal, excess, prolong, coarse, _bounds(coarse))
+        del graph
+        graph = joined(pieces)
+        del pieces
+        kept = coarse / diagonal.size
         last = coarse <= COARSEST or kept > _STALLED or len(levels) + 1 == _MAX_LEVELS
         below, new_position = (None, np.arange(coarse, dtype=np.int32)) if last else by_windows(graph, excess)
         transfer = transfer_of(prolong, position, new_position)
-        vectors = (np.zeros(size, np.float32) for size in (smoother.step.size, smoother.step.size, coarse))
+        vectors = (np.zeros(size, np.float32) for size in (smoother.size, smoother.size, coarse))
         levels.append(Level(smoother, transfer, *vectors))
         if below is None:
             break

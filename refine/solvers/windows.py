@@ -44,6 +44,10 @@ class WindowSmoother:
     step: Singles
     """`DAMPING` / diagonal, 0 where that is 0."""
 
+    @property
+    def size(self) -> int:
+        return self.step.size
+
     def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
         _from_zero(self.first, self.begin, self.column, self.value, self.back, self.step, b, x, left)
 
@@ -113,20 +117,20 @@ def _arrange(start, old_column, old_value, excess, position, first, begin, colum
                 e = start[i] + k
                 at = diagonals[k] + position[i] - low
                 column[at] = position[old_column[e]] + back - low
-                value[at] = _narrowed(old_value[e])
-                held += _widened(value[at])
+                value[at] = narrowed(old_value[e])
+                held += widened(value[at])
             step[position[i]] = DAMPING / np.float32(held) if held > 0 else 0
     begin[begin.size - 1] = column.size
 
 
 @njit(cache=True)
-def _narrowed(single):
+def narrowed(single):
     """bfloat16 of float32, rounded."""
     return (np.float32(single).view(np.uint32) + np.uint32(0x8000)) >> np.uint32(16)
 
 
 @njit(cache=True)
-def _widened(half):
+def widened(half):
     """float32 of bfloat16."""
     return np.uint32(np.uint32(half) << np.uint32(16)).view(np.float32)
 
@@ -137,7 +141,7 @@ def _add_coupled(first, begin, column, value, offset, window, x, out):
     for k in range(first[window], first[window + 1]):
         columns, values = column[begin[k] : begin[k + 1]], value[begin[k] : begin[k + 1]]
         for i in range(columns.size):
-            out[i] += _widened(values[i]) * x[np.uint64(columns[i] + offset)]
+            out[i] += widened(values[i]) * x[np.uint64(columns[i] + offset)]
 
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
