@@ -49,11 +49,13 @@ def galerkin_pieces(
     """P' M P as couplings and excess. The bounds say which of its rows are made side by side."""
     restrict = _transposed(prolong, coarse)
     start, next_excess = np.zeros(coarse + 1, np.int32), np.empty(coarse, np.float32)
-    sums = np.empty(diagonal.size, np.float64)
-    most = _sum_rows(prolong.start, prolong.value, sums)
+    parent, share = np.empty(diagonal.size, np.uint32), np.empty(diagonal.size, np.float32)
+    sums = np.empty(diagonal.size, np.float32)
+    most = _first_entries(*of(prolong), np.uint32(coarse), parent, share, sums)
     pieces = _multiply(
-        *of(graph), diagonal, excess, sums, *of(prolong), most, *of(restrict), bounds, start, next_excess
-    )
+        *_unsigned(graph), diagonal, excess, sums, parent, share, *_unsigned(prolong), most,
+        *_unsigned(restrict), bounds, start, next_excess,
+    )  # fmt: skip
     np.cumsum(start, out=start)
     columns, values = zip(*pieces, strict=True)
     return Pieces(start, list(columns), list(values)), next_excess
@@ -121,12 +123,20 @@ def _transpose(start, column, value, new_start, new_column, new_value):
             new_value[at] = value[e]
 
 
+def _unsigned(rows: Rows) -> tuple[NDArray[np.uint32], NDArray[np.uint32], Singles]:
+    """For a kernel: an index that cannot be negative needs not be asked whether it counts from the end."""
+    return rows.start.view(np.uint32), rows.column.view(np.uint32), rows.value
+
+
 @njit(cache=True, parallel=True)
-def _sum_rows(start, value, sums):
-    """Of each row, and the most entries in one."""
-    most = 0
+def _first_entries(start, column, value, none, parent, share, sums):
+    """Of each row the first entry, (none, 0) where there is none, and the sum; the most entries in one."""
+    most = 1
     for i in prange(sums.size):
-        total = 0.0
+        parent[i], share[i] = none, 0
+        if start[i] < start[i + 1]:
+            parent[i], share[i] = column[start[i]], value[start[i]]
+        total = np.float32(0)
         for e in range(start[i], start[i + 1]):
             total += value[e]
         sums[i] = total
@@ -135,34 +145,51 @@ def _sum_rows(start, value, sums):
 
 
 @njit(cache=True)
+def _add(j, amount, row, met, sums, columns, used):
+    """sums[j] += amount; j is put at the end of the columns if the row has not met it, without a branch."""
+    new = met[j] != row
+    met[j] = row
+    columns[used] = j
+    sums[j] = (0.0 if new else sums[j]) + amount
+    return used + new
+
+
+@njit(cache=True)
 def _rows(
-    start, column, value, diagonal, excess, row_sums,
-    p_start, p_column, p_value, most, r_start, r_column, r_value, first, last, count, next_excess,
+    start, column, value, diagonal, excess, row_sums, parent, share, p_start, p_column, p_value, most,
+    r_start, r_column, r_value, first, last, count, next_excess,
 ):  # fmt: skip
-    """Rows first to last of P' M P without the diagonal, as couplings."""
+    """Rows first to last of P' M P without the diagonal, as couplings.
+
+    Most rows of P have one entry: the first is taken without asking whether it is there.
+    """
+    one = np.uint32(1)
     columns = np.empty(12 * (last - first) + 64, np.int32)
     values = np.empty(columns.size, np.float32)
-    met, sums = np.full(r_start.size - 1, -1, np.int32), np.empty(r_start.size - 1, np.float64)
+    met, sums = np.full(r_start.size, -1, np.int32), np.empty(r_start.size, np.float64)
     used = 0
     for row in range(first, last):
         before, needed = used, used
         for e in range(r_start[row], r_start[row + 1]):
-            needed += (start[r_column[e] + 1] - start[r_column[e]] + 1) * most
+            needed += (start[r_column[e] + one] - start[r_column[e]] + 1) * most
         if needed > columns.size:
             columns = np.concatenate((columns, np.empty(needed, np.int32)))
             values = np.concatenate((values, np.empty(needed, np.float32)))
-        met[row] = row
+        met[row] = met[r_start.size - 1] = row
         held = 0.0
         for e in range(r_start[row], r_start[row + 1]):
-            i, share = r_column[e], np.float64(r_value[e])
-            used = _gather(p_start, p_column, p_value, i, -share * diagonal[i], row, met, sums, columns, used)
-            out = excess[i] * row_sums[i]
-            for f in range(start[i], start[i + 1]):
-                k = column[f]
-                used = _gather(p_start, p_column, p_value, k, share * value[f], row, met, sums, columns, used)
-                # P' M P 1, from differences.
-                out += value[f] * (row_sums[i] - row_sums[k])
-            held += share * out
+            i = r_column[e]
+            out = np.float64(excess[i] * row_sums[i])
+            for f in range(np.int64(start[i]) - 1, np.int64(start[i + one])):
+                own = f < start[i]
+                k = i if own else column[np.uint32(f)]
+                coupling = -diagonal[i] if own else value[np.uint32(f)]
+                out += coupling * (row_sums[i] - row_sums[k])  # P' M P 1, from differences
+                coupling *= r_value[e]
+                used = _add(parent[k], coupling * share[k], row, met, sums, columns, used)
+                for g in range(p_start[k] + one, p_start[k + one]):
+                    used = _add(p_column[g], coupling * p_value[g], row, met, sums, columns, used)
+            held += r_value[e] * out
         next_excess[row] = held
         for at in range(before, used):
             values[at] = sums[columns[at]]
@@ -170,29 +197,16 @@ def _rows(
     return columns[:used].copy(), values[:used].copy()
 
 
-@njit(cache=True)
-def _gather(p_start, p_column, p_value, k, factor, row, met, sums, columns, used):
-    """sums += factor times row k of P, what has not been met put at the end of the columns, without a branch."""
-    for g in range(p_start[k], p_start[k + 1]):
-        j = p_column[g]
-        new = met[j] != row
-        met[j] = row
-        columns[used] = j
-        used += new
-        sums[j] = (0.0 if new else sums[j]) + factor * p_value[g]
-    return used
-
-
 @njit(cache=True, parallel=True)
 def _multiply(
-    start, column, value, diagonal, excess, row_sums,
-    p_start, p_column, p_value, most, r_start, r_column, r_value, bounds, count, next_excess,
+    start, column, value, diagonal, excess, row_sums, parent, share, p_start, p_column, p_value, most,
+    r_start, r_column, r_value, bounds, count, next_excess,
 ):  # fmt: skip
     empty = (np.empty(0, np.int32), np.empty(0, np.float32))
     pieces = [empty for _ in range(bounds.size - 1)]
     for part in prange(bounds.size - 1):
         pieces[part] = _rows(
-            start, column, value, diagonal, excess, row_sums, p_start, p_column, p_value, most,
+            start, column, value, diagonal, excess, row_sums, parent, share, p_start, p_column, p_value, most,
             r_start, r_column, r_value, bounds[part], bounds[part + 1], count, next_excess,
         )  # fmt: skip
     return pieces

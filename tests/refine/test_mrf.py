@@ -413,7 +413,8 @@ def random_graph(size, reach, seed):
     ends = ends[ends[:, 0] != ends[:, 1]]
     couplings = sp.coo_array((rng.lognormal(0, 3, len(ends)), ends.T), shape=(size, size))
     couplings = sp.csr_array(couplings + couplings.T)
-    rows = Rows(couplings.indptr, couplings.indices, couplings.data.astype(np.float32))
+    start, column = couplings.indptr.astype(np.int32), couplings.indices.astype(np.int32)
+    rows = Rows(start, column, couplings.data.astype(np.float32))
     return rows, rng.uniform(0, 1, size).astype(np.float32)
 
 
