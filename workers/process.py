@@ -19,7 +19,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -98,23 +98,18 @@ class WorkerProcess:
     """
 
     def __init__(self, limits: Limits | None = None, environment: Mapping[str, str] | None = None) -> None:
-        """environment: variables for the process, set before it imports what the first call needs."""
+        """environment: variables for the process, there before it imports anything."""
         self.limits = limits or Limits()
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  (lives as long as the worker; has no name)
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
         self._process: BaseProcess = context.Process(
             target=_serve,
-            args=(
-                theirs,
-                _Inherited(self._output.fileno()),
-                os.getpid(),
-                self.limits,
-                dict(environment or {}),
-            ),
+            args=(theirs, _Inherited(self._output.fileno()), os.getpid(), self.limits),
             name="stereoforge-worker",
         )
-        self._process.start()
+        with _variables(environment or {}):
+            self._process.start()
         theirs.close()
         atexit.register(
             self.stop
@@ -240,13 +235,25 @@ def _over_memory(used: int, limit: int) -> str:
     return f"used {used / 2**20:.0f} MiB, more than its limit of {limit / 2**20:.0f} MiB"
 
 
-def _serve(
-    connection: Connection, output: int, parent: int, limits: Limits, environment: dict[str, str]
-) -> None:
+@contextlib.contextmanager
+def _variables(changes: Mapping[str, str]) -> Iterator[None]:
+    """These environment variables meanwhile, for a process that is started now."""
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _serve(connection: Connection, output: int, parent: int, limits: Limits) -> None:
     """The worker's side: calls as they come, until the other side is gone."""
     _die_with(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to handle.
-    os.environ.update(environment)
     _capture_output(output)
     _limit_address_space(limits)
     while True:

@@ -19,6 +19,8 @@ MAX_STARTS_KILLED = 100
 Counted apart, since coming up takes longer than a small job: where workers were killed every four seconds on a busy
 machine, 18 of 300 jobs were given up before any process had come to them.
 """
+SAME_SUMS = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+"""Matrix products on several threads add up in another order: a scene's last bits would tell how many cores it had."""
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -130,7 +132,7 @@ class Supervisor:
     def _replace(self) -> None:
         if self._worker:
             self._worker.stop()
-        self._worker = WorkerProcess(self.policy.limits, self._environment)
+        self._worker = WorkerProcess(self.policy.limits, {**SAME_SUMS, **(self._environment or {})})
         self._jobs_done = 0
 
     def _recycle(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import os
 import signal
 import time
@@ -10,10 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from datagen.executors import LocalExecutor, WorkerPolicy, supervisor
 from datagen.executors.devices import assign_devices, find_gpus
+from scenes import sample_scene, scene_to_json
 from workers import Limits
 
 
@@ -159,6 +162,20 @@ def test_each_worker_has_its_environment() -> None:
     environments = tuple({"CUDA_VISIBLE_DEVICES": str(index)} for index in range(2))
     executor = LocalExecutor(environments)
     assert {outcome.result for outcome in executor.run(gpu_seen, range(4))} == {"0", "1"}
+
+
+def scene_hash(seed: int) -> str:
+    scene = sample_scene(np.random.default_rng(seed), "monkaa")
+    return hashlib.sha256(scene_to_json(scene).encode()).hexdigest()
+
+
+@pytest.mark.slow
+def test_a_scene_s_last_bits_do_not_tell_how_many_cores_there_were(monkeypatch: pytest.MonkeyPatch) -> None:
+    hashes = []
+    for threads in ("1", "4"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)  # As many as OpenBLAS takes, if told nothing else.
+        hashes.append([outcome.result for outcome in LocalExecutor(({},)).run(scene_hash, range(3))])
+    assert hashes[0] == hashes[1]
 
 
 def test_one_worker_a_gpu_and_each_its_own() -> None:
