@@ -19,6 +19,8 @@ from typing import IO
 
 LOCK = "lock"
 _GUARD = ".guard"
+_MISSES = 1000
+"""How often in a row a folder may vanish between being made and being used."""
 _VARIABLES = ("TMPDIR", "TMP", "TEMP")
 """Where programs look for the folder of temporary files: Blender at TMP first, Python at TMPDIR."""
 
@@ -69,6 +71,7 @@ class TemporaryFolders:
 
     def _take_guard(self) -> tuple[IO[str], bool]:
         """The parent's own lock file, and whether it could be locked."""
+        missed = 0
         while True:
             try:
                 self.parent.mkdir(parents=True, exist_ok=True, mode=0o700 if self.private else 0o777)
@@ -76,7 +79,8 @@ class TemporaryFolders:
                     raise PermissionError(13, "belongs to somebody else", str(self.parent))
                 guard = (self.parent / _GUARD).open("a")
             except (FileNotFoundError, FileExistsError):
-                if self.parent.is_file():
+                missed += 1
+                if missed == _MISSES:  # It cannot be made: a link to nowhere, or no place for folders.
                     raise
                 continue  # Whoever used the parent last has just removed it.
             locked = _lock(guard)

@@ -34,6 +34,14 @@ def start_holder(parent: Path) -> tuple[subprocess.Popen[str], Path]:
     return process, Path(process.stdout.readline().strip())
 
 
+def test_a_place_where_no_folder_can_be_is_an_error_and_no_endless_loop(tmp_path: Path) -> None:
+    (tmp_path / "nowhere").symlink_to(tmp_path / "missing")
+    (tmp_path / "file").write_text("x")
+    for parent in (tmp_path / "nowhere" / "a", tmp_path / "file" / "a", tmp_path / "file"):
+        with pytest.raises(OSError, match=parent.parts[-1]), TemporaryFolders(parent).new():
+            pass
+
+
 def test_a_folder_is_gone_at_the_end_and_its_parent_with_the_last(tmp_path: Path) -> None:
     folders = TemporaryFolders(tmp_path / "a" / "b")
     with folders.new() as first, folders.new() as second:
