@@ -22,7 +22,8 @@ PHONE_PX = 400
 PAGE = """
 {% extends "base.html" %}{% from "macros.html" import compare, table %}
 {% block content %}
-{{ table(["name", "a long heading of a number", "another", "third", "fourth", "fifth"], rows, "", "numbers") }}
+{{ table(["name", "a long heading of a number", "a_name_without_a_gap_0123456789", "third", "fourth", "fifth"],
+         rows, "", "numbers") }}
 {{ plot }}
 {{ compare(before, after, "before", "after") }}
 {% endblock %}
@@ -32,8 +33,10 @@ PROBE = """
 window.onload = () => {
   const page = document.querySelector("iframe").contentDocument, view = page.defaultView;
   const names = () => [...page.querySelectorAll("#numbers tbody th")].map(cell => cell.textContent);
+  const headings = [...page.querySelectorAll("#numbers thead th")];
+  const overflowing = headings.filter(cell => cell.scrollWidth > cell.clientWidth + 1);
   const press = () => page.querySelectorAll("#numbers thead th")[1].click();
-  const facts = { width: page.documentElement.scrollWidth, unsorted: names() };
+  const facts = { width: page.documentElement.scrollWidth, unsorted: names(), overflowing: overflowing.length };
   press(); facts.ascending = names();
   press(); facts.descending = names();
   const plot = page.querySelector(".plot"), box = plot.querySelector("svg").getBoundingClientRect();
@@ -107,6 +110,10 @@ def test_a_pointer_over_a_plot_reads_every_curve_there(facts: dict[str, Any]) ->
     assert facts["shown"] == "block"
     assert facts["note"] == ["x of it: 3", "rising: 6", "falling: 7"]
     assert facts["left"] == "none"
+
+
+def test_a_long_name_stays_in_its_column(facts: dict[str, Any]) -> None:
+    assert facts["overflowing"] == 0
 
 
 def test_the_handle_shows_more_of_one_picture(facts: dict[str, Any]) -> None:
