@@ -44,11 +44,11 @@ check: .venv/.installed-dev
 test-blender-5.2: $(BLENDER_5_2)/.installed
 	OMP_NUM_THREADS=1 $(BLENDER_5_2)/bin/python -m pytest $(PYTEST_FLAGS) tests/scenes tests/datagen tests/storage tests/viewing
 
-$(BLENDER_5_2)/.installed: pyproject.toml
+$(BLENDER_5_2)/.installed: pyproject.toml constraints-blender-5.2.txt
 	@$(PYTHON313) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 13))' 2>/dev/null || \
 	  { echo "Blender 5.2's library needs Python 3.13, which is not here; say where with make test-blender-5.2 PYTHON313=/path/to/python3.13"; exit 1; }
 	$(PYTHON313) -m venv $(BLENDER_5_2)
-	$(BLENDER_5_2)/bin/python -m pip install --quiet --progress-bar off $(PIP_FLAGS) 'bpy>=5.2,<5.3' --editable '.[render,dev]'
+	$(BLENDER_5_2)/bin/python -m pip install --quiet --progress-bar off --constraint constraints-blender-5.2.txt $(PIP_FLAGS) --editable '.[render,dev]'
 	@touch $@
 
 .venv/bin/python:
