@@ -11,6 +11,8 @@ T = TypeVar("T")
 
 Range = tuple[float, float]
 """Lower and upper bound of a uniform draw."""
+Count = tuple[int, int]
+"""Smallest and largest number, both included."""
 
 
 def uniform(rng: np.random.Generator, low: float, high: float) -> float:

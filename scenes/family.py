@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Self, get_type_hints
 
 import numpy as np
 
 from scenes.assets import AssetPool
+from scenes.drawing import Count, Range
 from scenes.own_content import Replaceable
 from scenes.spec import Scene
 
@@ -35,6 +36,22 @@ class FamilyConfig:
     frames: int = 1
     """Frames per scene."""
 
+    def __post_init__(self) -> None:
+        """Raises ValueError for what no family can sample; a family's own checks come after these."""
+        for name, kind in _numbers(type(self)).items():
+            given = getattr(self, name)
+            values = given if isinstance(given, tuple) else (given,)
+            if not np.isfinite(values).all():
+                raise ValueError(f"{name} must be finite, got {given}")
+            if kind in (Range, Count) and values[0] > values[1]:
+                raise ValueError(f"{name} must be (low, high), got {given}")
+            if kind == Count and values[0] < 0:
+                raise ValueError(f"{name} must not be negative, got {given}")
+            if kind is float and name.endswith("_share") and not 0 <= given <= 1:
+                raise ValueError(f"{name} must be in 0..1, got {given}")
+        if self.frames < 1:
+            raise ValueError(f"frames must be at least 1, got {self.frames}")
+
     def with_assets(self, assets: AssetPool) -> Self:  # noqa: ARG002
         """This config for a family that draws the user's files while it samples; others have theirs replaced."""
         return self
@@ -54,14 +71,23 @@ class FamilyConfig:
     def at_complexity(self, complexity: float) -> Self:
         """This config made simpler, for curricula: a tenth of the things at 0, as it is at 1.
 
-        Raises ValueError for a complexity outside 0..1.
+        Raises ValueError for a complexity outside 0..1, or for a family that names nothing to have fewer of.
         """
         if not 0 <= complexity <= 1:
             raise ValueError(f"complexity must be from 0 to 1, got {complexity}")
+        if complexity < 1 and not self.crowd and not self.sparsity:
+            raise ValueError(f"{type(self).__name__} names no crowd that a curriculum could make smaller")
         factor = EMPTIEST + (1 - EMPTIEST) * complexity
         changes: dict[str, Any] = {name: _scaled(getattr(self, name), factor) for name in self.crowd}
         changes |= {name: _scaled(getattr(self, name), 1 / factor) for name in self.sparsity}
         return replace(self, **changes)
+
+
+def _numbers(config: type[FamilyConfig]) -> dict[str, Any]:
+    """The types of the fields that hold numbers or tuples of them, by name."""
+    kinds = (int, float, Range, Count, tuple[float, ...])
+    hints = get_type_hints(config)
+    return {field.name: hints[field.name] for field in fields(config) if hints[field.name] in kinds}
 
 
 def _scaled(limits: tuple[float, float], factor: float) -> tuple[float, float]:
@@ -82,3 +108,8 @@ class Family:
     """Draws one scene from a generator and an instance of `config`."""
     replaceable: Replaceable | None = None
     """What may be the user's own; None where the family draws it itself (`with_assets`)."""
+
+    @property
+    def takes_assets(self) -> bool:
+        """Whether its worlds can show the user's own files."""
+        return self.replaceable is not None or self.config.with_assets is not FamilyConfig.with_assets

@@ -16,9 +16,6 @@ from scenes.motion import KEY_SPACING_FRAMES, exposure_times, vector, wander
 from scenes.shapes.landforms import Landscape
 from scenes.spec import Color, FinalPass, Fog, StereoCamera
 
-Count = tuple[int, int]
-"""Smallest and largest number, both included."""
-
 NEAREST_SHARE = 0.105
 """Disparity of the nearest surface allowed, as a share of the image width: 101 px at 960."""
 
@@ -44,18 +41,12 @@ class LandscapeConfig(FamilyConfig):
     """Share of the scenes with fog in the final pass, 0..1."""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if isinstance(value, tuple) and value[0] > value[1]:
-                raise ValueError(f"{name} must be (low, high), got {value}")
-            if name.endswith("_share") and not isinstance(value, tuple) and not 0 <= value <= 1:
-                raise ValueError(f"{name} must be in 0..1, got {value}")
+        super().__post_init__()
         for name in ("focal_mm", "focus_disparity_share", "focus_height_share"):
             if getattr(self, name)[0] <= 0:
                 raise ValueError(f"{name} must be above 0, got {getattr(self, name)}")
         if self.focus_disparity_share[1] > NEAREST_SHARE / 2:
             raise ValueError(f"focus_disparity_share must not exceed {NEAREST_SHARE / 2}")
-        if self.frames < 1:
-            raise ValueError(f"frames must be at least 1, got {self.frames}")
 
 
 @dataclass(frozen=True)

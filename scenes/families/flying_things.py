@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.assets import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture
-from scenes.drawing import Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.drawing import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.family import Family, FamilyConfig
 from scenes.lights import sample_area_light, sample_sun
 from scenes.materials import sample_material
@@ -37,9 +37,6 @@ from scenes.spec import (
     World,
 )
 from scenes.textures.sky import Sky
-
-Count = tuple[int, int]
-"""Smallest and largest number, both included."""
 
 _SHAPE_FILL = 1.8
 """Mean projected area of the shapes, in squares of their half extent; measured over 300 draws."""
@@ -123,16 +120,12 @@ class FlyingThingsConfig(FamilyConfig):
         return max(min(drawn, 1), round(drawn * (0.1 + 0.9 * self.complexity)))
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0 <= self.complexity <= 1:
             raise ValueError(f"flying_things: complexity must be from 0 to 1, got {self.complexity}")
-        for name, value in vars(self).items():
-            if isinstance(value, tuple) and value[0] > value[1]:
-                raise ValueError(f"flying_things: {name} must be (low, high), got {value}")
         for name in ("focal_mm", "baseline_m", "disparity_share", "background_disparity_share"):
             if getattr(self, name)[0] <= 0:
                 raise ValueError(f"flying_things: {name} must be above 0, got {getattr(self, name)}")
-        if self.frames < 1:
-            raise ValueError(f"flying_things: frames must be at least 1, got {self.frames}")
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.drawing import Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.drawing import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.family import Family
 from scenes.figures import Coat, Figure, sample_creature
 from scenes.lights import sample_area_light, sample_light_color, sample_sun
 from scenes.motion import vector
 from scenes.outdoors import (
-    Count,
     Land,
     LandscapeConfig,
     half_height,

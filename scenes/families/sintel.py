@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from scenes.drawing import Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.drawing import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.family import Family
 from scenes.figures import Coat, Figure, sample_creature, sample_person, statue
 from scenes.lights import sample_area_light, sample_sun
 from scenes.outdoors import (
-    Count,
     Land,
     LandscapeConfig,
     half_height,

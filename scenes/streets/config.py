@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenes.drawing import Range
+from scenes.drawing import Count, Range
 from scenes.family import FamilyConfig
-
-Count = tuple[int, int]
-"""Smallest and largest number, both included."""
 
 
 @dataclass(frozen=True)
@@ -78,11 +75,7 @@ class DrivingConfig(FamilyConfig):
     """How many of the other scenes have no hard shadows."""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if isinstance(value, tuple) and name != "focal_lengths_mm" and value[0] > value[1]:
-                raise ValueError(f"driving: {name} must be (low, high), got {value}")
-            if name.endswith("_share") and isinstance(value, float) and not 0.0 <= value <= 1.0:
-                raise ValueError(f"driving: {name} must be within 0..1, got {value}")
+        super().__post_init__()
         positive = ("baseline_m", "camera_height_m", "lane_m", "pavement_m", "kerb_m", "headway_m", "view_m")
         for name in (*positive, "tree_spacing_m", "lamp_spacing_m", "lanes"):
             if getattr(self, name)[0] <= 0:
@@ -91,5 +84,3 @@ class DrivingConfig(FamilyConfig):
             raise ValueError(f"driving: focal_lengths_mm must be above 0, got {self.focal_lengths_mm}")
         if self.largest_disparity_share <= 0:
             raise ValueError("driving: largest_disparity_share must be above 0")
-        if self.frames < 1:
-            raise ValueError(f"driving: frames must be at least 1, got {self.frames}")

@@ -257,7 +257,7 @@ def test_disparities_are_those_of_a_street() -> None:
     [
         ({"lane_m": (4.0, 3.0)}, r"lane_m must be \(low, high\)"),
         ({"baseline_m": (0.0, 1.0)}, "baseline_m must be above 0"),
-        ({"dusk_share": 1.5}, r"dusk_share must be within 0\.\.1"),
+        ({"dusk_share": 1.5}, r"dusk_share must be in 0\.\.1"),
         ({"focal_lengths_mm": ()}, "focal_lengths_mm must be above 0"),
         ({"frames": 0}, "frames must be at least 1"),
     ],
