@@ -117,6 +117,8 @@ def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> str | None:
         arrays = prepare(path)
     except MemoryError:
         return "needs too much memory"
+    except KeyError as error:
+        return f"cannot be read (it has no {error})"
     except Exception as error:
         return f"cannot be read ({' '.join(str(error).split())[:200] or type(error).__name__})"
     temporary = target.with_suffix(f".{os.getpid()}.tmp")

@@ -47,6 +47,9 @@ class Curation:
     def __post_init__(self) -> None:
         if self.attempts < 1:
             raise DatasetError(f"curation attempts must be at least 1, got {self.attempts}")
+        for name in ("max_inside", "max_one_object", "max_hidden", "min_textured", "max_outside"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise DatasetError(f"curation {name} must be in 0..1, got {getattr(self, name):g}")
         if self.disparity_px and not 0 <= self.disparity_px[0] < self.disparity_px[1]:
             raise DatasetError(
                 f"curation disparity_px must be (least, greatest), got {tuple(self.disparity_px)}"

@@ -54,7 +54,7 @@ def estimate_run(
     frames = recipe.world.frames * sum(missing.values())
     if not frames:
         return Estimate(missing, already, 0, 0.0, 0.0)
-    manifest = _measured(recipe, next(split for split, count in missing.items() if count), device)
+    manifest = _measured(recipe, root, next(split for split, count in missing.items() if count), device)
     steps = manifest.seconds
     once = sum(steps[name] for name in ONCE_A_SCENE)
     seconds = once + recipe.world.frames * (sum(steps.values()) - once)
@@ -62,10 +62,14 @@ def estimate_run(
     return Estimate(missing, already, frames, seconds, per_scene + recipe.world.frames * per_frame)
 
 
-def _measured(recipe: Recipe, split: str, device: str) -> SceneManifest:
-    """The manifest of the split's first scene, cut to one frame."""
-    one = replace(recipe, world=replace(recipe.world, frames=1), scenes={split: 1})
+def _measured(recipe: Recipe, root: Path | str, split: str, device: str) -> SceneManifest:
+    """The manifest of the split's first scene, cut to one frame and as full as after a curriculum."""
+    world = replace(recipe.world, frames=1)
+    one = replace(recipe, world=world, scenes={split: 1}, curriculum_scenes=0)
     with temporary_folder() as folder:
+        if recipe.assets:
+            render_dataset(replace(one, scenes={}), folder / "set")
+            Layout(folder / "set").assets.symlink_to(Layout(Path(root)).assets.resolve())
         summary = render_dataset(one, folder / "set", workers=1, device=device)
         if summary.failures:
             raise DatasetError(f"the scene to measure could not be rendered: {summary.failures[0].reason}")

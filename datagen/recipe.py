@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ from datagen.curation import Curation
 from datagen.disparity_histogram import DisparityHistogram, fitted, with_depths
 from datagen.disparity_range import REACHED_PERCENT, with_disparity_at
 from datagen.errors import DatasetError
-from datagen.formats.limits import read_bounded
+from datagen.formats.limits import MAX_ELEMENTS, read_bounded
 from datagen.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
 from scenes.assets import AssetPool
@@ -57,15 +59,10 @@ class Recipe:
                 raise DatasetError(f"there is no split {split!r}; there are {', '.join(SPLITS)}")
             if count < 0:
                 raise DatasetError(f"the number of {split} scenes must not be negative, got {count}")
-        if not self.passes or not set(self.passes) <= set(RENDER_PASSES):
-            raise DatasetError(
-                f"passes must be among {', '.join(RENDER_PASSES)}, got {', '.join(self.passes)!r}"
-            )
-        unknown = sorted(set(self.targets) - set(EXTRA_TARGETS))
-        if unknown:
-            raise DatasetError(
-                f"targets must be among {', '.join(EXTRA_TARGETS)}, got {', '.join(unknown)!r}"
-            )
+        if not self.passes:
+            raise DatasetError(f"passes must be among {', '.join(RENDER_PASSES)}, got none")
+        _check_names("passes", self.passes, RENDER_PASSES)
+        _check_names("targets", self.targets, EXTRA_TARGETS)
         at_least_one = {
             "samples": self.samples,
             "width": self.world.width,
@@ -75,8 +72,13 @@ class Recipe:
         for name, value in at_least_one.items():
             if value < 1:
                 raise DatasetError(f"{name} must be at least 1, got {value}")
+        self._check_size()
+        if not 0 < self.gradient_threshold_px < math.inf:
+            raise DatasetError(f"gradient_threshold_px must be above 0, got {self.gradient_threshold_px:g}")
         if self.curriculum_scenes < 0:
             raise DatasetError(f"curriculum_scenes must not be negative, got {self.curriculum_scenes}")
+        if self.assets and not FAMILIES[self.family].takes_assets:
+            raise DatasetError(f"worlds of {self.family} take no meshes, textures or environments of yours")
         try:
             self.world.at_complexity(0.0 if self.curriculum_scenes else 1.0)
             if self.curation.disparity_px:
@@ -89,6 +91,20 @@ class Recipe:
             object.__setattr__(self, "disparities", fitted(self.disparities, self.world, self.seed))
         if self.seed < 0:
             raise DatasetError(f"the seed must not be negative, got {self.seed}")
+
+    def _check_size(self) -> None:
+        """Raise DatasetError for images that no reader would take, and disparities that no eye would see."""
+        width, height = self.world.width, self.world.height
+        if 3 * width * height > MAX_ELEMENTS:
+            raise DatasetError(
+                f"images of {width}x{height} are too large: files of a data set hold {MAX_ELEMENTS // 3} pixels"
+            )
+        ranges = (self.curation.disparity_px, self.disparities and self.disparities.edges_px)
+        greatest = max((limits[-1] for limits in ranges if limits), default=0.0)
+        if greatest > width:
+            raise DatasetError(
+                f"a disparity of {greatest:g} px is never seen in images that are {width} px wide"
+            )
 
     @property
     def family(self) -> str:
@@ -116,8 +132,18 @@ class Recipe:
         return with_disparity_at(scene, 50.0, component.median_px) if component else scene
 
 
+def _check_names(what: str, names: tuple[str, ...], known: Collection[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise DatasetError(f"{what} must be among {', '.join(known)}, got {name!r}")
+        if names.count(name) > 1:
+            raise DatasetError(f"{what} name {name!r} {names.count(name)} times")
+
+
 def recipe_from_plain(data: Any, origin: str) -> Recipe:
     """Raises DatasetError naming `origin` for anything that is not a recipe."""
+    if not isinstance(data, dict):
+        raise DatasetError(f"{origin} is not a valid recipe: it has no settings, such as world: and scenes:")
     try:
         return from_plain(data, Recipe)
     except (ValueError, RecursionError) as error:

@@ -75,8 +75,12 @@ def render_dataset(
     DiskFullError, with the data set as whole as it is, when there is no room for more.
     """
     tree = open_tree(root)
+    if isinstance(tree, LocalTree) and tree.root.exists() and not tree.root.is_dir():
+        raise DatasetError(f"{tree.name} is a file, not a folder; give a new or empty folder")
     wanted = list(_wanted(recipe, shard))
     merged = _merge(tree, recipe)
+    if wanted:
+        _check_store(tree, recipe)
     executor = executor or local_executor(workers, device)
     with staging_area(tree) as area, run_log(tree, area.folder) as log:
         _write_recipe(tree, area, merged)
@@ -215,6 +219,22 @@ def _merge(tree: Tree, recipe: Recipe) -> Recipe:
     if set(tree.files_in("")) - {STAGING_FOLDER}:
         raise DatasetError(f"{tree.name} is neither empty nor a data set; give a new or empty folder")
     return recipe
+
+
+def _check_store(tree: Tree, recipe: Recipe) -> None:
+    """Raise DatasetError unless the user's files that a recipe names are in the data set's own store."""
+    pool = recipe.assets
+    if not pool:
+        return
+    if not isinstance(tree, LocalTree):
+        raise DatasetError(f"{tree.name}: a recipe with files of your own needs a folder, not a URL")
+    store = Layout(tree.root).assets
+    for asset in (*pool.meshes, *pool.textures, *pool.environments):
+        if not (store / f"{asset.sha256}.npz").is_file():
+            raise DatasetError(
+                f"{tree.name} has no prepared file of {asset.name}, which the recipe names: give the folders of "
+                "your own files again"
+            )
 
 
 def _write_recipe(tree: Tree, area: StagingArea, recipe: Recipe) -> None:

@@ -28,10 +28,14 @@ def use_store(folder: Path) -> None:
         _stores.append(folder)
 
 
+def _check_sha256(text: str) -> None:
+    if not _SHA256.fullmatch(text):
+        raise ValueError(f"a user's file is named by its SHA-256, not {text[:80]!r}")
+
+
 def _load(sha256: str) -> dict[str, NDArray[np.generic]]:
     """Raises ValueError for what is not in any store."""
-    if not _SHA256.fullmatch(sha256):
-        raise ValueError(f"a user's file is named by its SHA-256, not {sha256[:80]!r}")
+    _check_sha256(sha256)
     for folder in _stores:
         path = folder / f"{sha256}.npz"
         if path.is_file():
@@ -48,6 +52,9 @@ class Asset:
     """What it was called, for people."""
     sha256: str
     """Of its bytes."""
+
+    def __post_init__(self) -> None:
+        _check_sha256(self.sha256)
 
     @property
     def split(self) -> str:

@@ -69,13 +69,28 @@ def _one_sentence(complaint: str) -> str:
     bare = complaint.translate(dict.fromkeys(map(ord, "╭╮╰╯│"), " "))
     parts = [" ".join(part.split()) for part in re.split(r"[─-]{5,}", bare)]
     _, said, *others = [part for part in parts if part.strip("─ ")]
-    sentence = said.split(" Got errors:")[0]
+    sentence = _plain(said.split(" Got errors:")[0])
     for other in others:
         if other.startswith("Perhaps you meant:"):
             sentence += f" (perhaps you meant {other.split()[3]}?)"
         elif other.startswith("Available subcommands:"):
             sentence += f" (a{other[1:]})"
     return sentence
+
+
+def _plain(complaint: str) -> str:
+    """tyro's complaint about a flag's value in a user's words: no types, and no None among the choices."""
+    if wanted := re.search(
+        r"Error parsing (\S+): no type matching .*\b(INT|FLOAT)\b.* from \['(.*)'\]", complaint
+    ):
+        kind = {"INT": "a whole number", "FLOAT": "a number"}[wanted[2]]
+        return f"{wanted[1]} takes {kind}, not {wanted[3]!r}"
+    if wanted := re.search(r"Error parsing (\S+): could not convert string to float: '(.*)'", complaint):
+        return f"{wanted[1]} takes a number, not {wanted[2]!r}"
+    if choices := re.search(r"Expected one of \((.*)\)", complaint):
+        names = sorted(name for name in re.findall(r"'([^']*)'", choices[1]) if name != "None")
+        return f"{complaint[: choices.start()]}Expected one of {', '.join(names)}."
+    return complaint
 
 
 def _explain(error: Exception) -> tuple[str, int]:

@@ -90,11 +90,20 @@ class Render:
     disparity_histogram: Annotated[str | None, shown("LOW-HIGH:WEIGHT,...", "the family's")] = None
     """How many pixels of surfaces shall have which disparity over all scenes together, such as
     2-20:30,20-60:50,60-120:20: ranges in pixels and their weights, met by choosing depths and baseline."""
+    curriculum: Annotated[int | None, shown("N", 0)] = None
+    """Over the first N scenes of the split the worlds grow from a tenth of their things to all of them."""
     dry_run: bool = False
     """Say what would be rendered, how long it would take and how much disk, measured on one frame of one
     scene; nothing is written."""
 
     def run(self) -> None:
+        parse_shard(self.shard)
+        if not self.out:
+            raise UsageError("--out needs a folder or a URL")
+        if self.dry_run and self.only_failed:
+            raise UsageError(
+                "--dry-run counts what is missing, not what is in quarantine: leave --only-failed out"
+            )
         recipe = self._recipe()
         executor = self._executor()
         if self.meshes or self.textures or self.environments:
@@ -198,6 +207,8 @@ class Render:
             width, height = parse_size(self.size)
             world = replace(world, width=width, height=height)
         if self.frames_per_scene is not None:
+            if self.frames_per_scene < 1:
+                raise UsageError(f"--frames-per-scene must be at least 1, got {self.frames_per_scene}")
             world = replace(world, frames=self.frames_per_scene)
         changes: dict[str, Any] = {"world": world}
         if self.scenes is not None or self.split is not None:
@@ -212,6 +223,8 @@ class Render:
             changes["curation"] = replace(base.curation, disparity_px=limits)
         if self.disparity_histogram is not None:
             changes["disparities"] = parse_histogram(self.disparity_histogram)
+        if self.curriculum is not None:
+            changes["curriculum_scenes"] = self.curriculum
         changes |= {key: getattr(self, key) for key in ("seed", "samples") if getattr(self, key) is not None}
         try:
             return replace(base, **changes)

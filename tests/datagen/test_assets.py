@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,8 +14,9 @@ import OpenEXR
 import pytest
 import trimesh
 
-from datagen import DatasetError, Recipe, StereoDataset, read_recipe
+from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.assets import ImportedAssets, _import_folder, import_assets
+from datagen.estimate import estimate_run
 from datagen.layout import Layout
 from datagen.manifest import read_manifest
 from datagen.verify import verify_dataset
@@ -172,8 +174,9 @@ def test_unknown_folders_and_files_are_refused(user: Path, tmp_path: Path) -> No
         import_assets(tmp_path / "store", textures=user / "environments")
     with pytest.raises(ValueError, match="in no store"):
         UserMesh("ab" * 32).mesh()
-    with pytest.raises(ValueError, match="named by its SHA-256"):
-        UserMesh("../../etc/passwd").mesh()
+    for named in (UserMesh("../../etc/passwd").mesh, lambda: Asset("x", "../../etc/passwd")):
+        with pytest.raises(ValueError, match="named by its SHA-256"):
+            named()
 
 
 def test_a_data_set_carries_the_files_it_uses(user: Path, tmp_path: Path) -> None:
@@ -192,6 +195,13 @@ def test_a_data_set_carries_the_files_it_uses(user: Path, tmp_path: Path) -> Non
     assert any(name.startswith("picture_") for name in statistics["assets"])
     record = json.loads(Layout(out).scene_record("train", 0).read_text())
     assert any(thing["shape"]["kind"] == "UserMesh" for thing in record["objects"])
+    # Its recipe elsewhere lacks them, and is refused before anything is made.
+    with pytest.raises(DatasetError, match="give the folders of your own files again"):
+        render_dataset(written, tmp_path / "other")
+    assert not (tmp_path / "other").exists()
+    with pytest.raises(DatasetError, match="a folder, not a URL"):
+        render_dataset(written, "memory://set")
+    assert estimate_run(replace(written, scenes={"train": 2}), out).frames == 1
     # Elsewhere, and without the folders the files came from, the set is still whole.
     moved = out.rename(tmp_path / "moved")
     assert verify_dataset(moved, workers=1).problems == ()

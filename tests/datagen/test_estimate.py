@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from datagen import Recipe, StereoDataset, read_recipe, render_dataset
+from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.estimate import estimate_run
 from datagen.layout import Layout
 from datagen.manifest import read_manifest
-from datagen.recipe import write_recipe
-from scenes import FAMILIES
+from datagen.recipe import recipe_from_text, write_recipe
+from scenes import FAMILIES, FamilyConfig
 from scenes.shapes.basic import Box, Superquadric
 from scenes.shapes.revolved import Cylinder
 from stereoforge.cli import main
@@ -112,6 +113,36 @@ def test_a_curriculum_never_asks_for_nothing_where_there_was_something() -> None
     assert (simple.creatures, simple.undergrowth) == ((1, 1), (3, 6))
     with pytest.raises(ValueError, match="from 0 to 1"):
         simple.at_complexity(1.5)
+
+
+def test_a_family_that_names_no_crowd_has_no_curriculum_and_says_so() -> None:
+    class Plain(FamilyConfig):
+        pass
+
+    assert Plain().at_complexity(1.0) == Plain()
+    with pytest.raises(ValueError, match="Plain names no crowd"):
+        Plain().at_complexity(0.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"gradient_threshold_px": 0.0}, "gradient_threshold_px must be above 0"),
+        ({"gradient_threshold_px": float("nan")}, "gradient_threshold_px must be above 0"),
+        ({"passes": ("clean", "clean")}, "passes name 'clean' 2 times"),
+        ({"targets": ("normals", "colour")}, "targets must be among"),
+        ({"world": replace(WORLD, width=20000, height=20000)}, "20000x20000 are too large"),
+    ],
+)
+def test_recipes_that_make_no_sense_are_refused(change: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(DatasetError, match=sentence):
+        replace(RECIPE, **change)
+
+
+@pytest.mark.parametrize("text", ["", "- 1", "hello"])
+def test_a_file_that_is_no_recipe_is_said_so(text: str) -> None:
+    with pytest.raises(DatasetError, match=r"^it is not a valid recipe: it has no settings"):
+        recipe_from_text(text.encode(), "it")
 
 
 @pytest.mark.parametrize(

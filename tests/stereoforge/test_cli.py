@@ -74,7 +74,22 @@ def test_the_module_and_the_script_are_one_program() -> None:
 
 
 def test_wrong_flags_exit_with_2(tmp_path: Path, refused: Callable[..., str]) -> None:
-    assert "--samples" in refused(2, "render", "--out", tmp_path / "set", "--samples", "many")
+    refusals = (
+        ("--samples", "many", "--samples takes a whole number, not 'many'"),
+        ("--seed", "1e9", "--seed takes a whole number, not '1e9'"),
+        ("--scene-timeout", "long", "--scene-timeout takes a number, not 'long'"),
+        ("--split", "dev", "Expected one of test, train, val."),
+        ("--frames-per-scene", "0", "--frames-per-scene must be at least 1"),
+        ("--shard", "x", "I/N"),
+        ("--curriculum", "-2", "must not be negative"),
+        ("--size", "99999x99999", "too large"),
+        ("--disparity-range", "2,2000", "never seen in images that are 960 px wide"),
+        ("--disparity-histogram", "2-2000:1", "never seen in images that are 960 px wide"),
+    )
+    for flag, value, sentence in refusals:
+        assert sentence in refused(2, "render", "--out", tmp_path / "set", flag, value)
+    assert "--only-failed" in refused(2, "render", "--out", tmp_path / "set", "--dry-run", "--only-failed")
+    assert "--out needs a folder" in refused(2, "render", "--out", "")
     assert "meant --samples?" in refused(2, "render", "--out", tmp_path / "set", "--sampels", "4")
     assert "Missing from stereoforge render: --out DIR" in refused(2, "render")
     assert "evaluate" in refused(2, "paint")
@@ -101,6 +116,7 @@ def test_no_data_and_wrong_folders_are_sentences(tmp_path: Path, refused: Callab
         ):
             assert str(folder) in refused(1, *command)
     assert "neither empty nor a data set" in refused(1, *RenderTiny, "--out", empty)
+    assert "is a file, not a folder" in refused(1, *RenderTiny, "--out", empty / "note.txt")
     assert not (tmp_path / "page.html").exists()
 
 
