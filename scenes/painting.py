@@ -183,3 +183,9 @@ def to_bytes(picture: Picture) -> NDArray[np.uint8]:
     """Round to (H, W, 3) uint8."""
     pixels: NDArray[np.uint8] = kernels.to_bytes(np.ascontiguousarray(picture))
     return pixels
+
+
+def shade(lightness: float, chroma: float, hue_deg: float) -> Srgb:
+    """An sRGB colour by perceptual lightness 0..1, chroma 0..0.3 and hue (30 red, 100 yellow, 140 green)."""
+    (rgb,) = oklch_to_srgb(np.array([lightness]), np.array([chroma]), np.radians([hue_deg]))
+    return (int(rgb[0]), int(rgb[1]), int(rgb[2]))

@@ -29,7 +29,8 @@ from scenes.outdoors import (
 from scenes.own_content import Replaceable
 from scenes.planting import Garden, anywhere, boulders, grass, mushrooms, plants, trees, undergrowth
 from scenes.shapes.landforms import Cavern, Dripstone, Landscape
-from scenes.shapes.plants import Bush, Palm, Tree, Vine
+from scenes.shapes.plants import Bush, Vine
+from scenes.shapes.trees import Palm, Tree
 from scenes.spec import AreaLight, Light, Scene, World
 from scenes.stage import Spot, Stage
 from scenes.stuffs import Stuff, eye, fur, ground, hide, horn, leaves, rock

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from scenes.drawing import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.family import Family
-from scenes.figures import Coat, Figure, sample_creature, sample_person, statue
+from scenes.figures import Coat, Figure, sample_creature
 from scenes.lights import sample_area_light, sample_sun
 from scenes.outdoors import (
     Land,
@@ -29,10 +29,11 @@ from scenes.outdoors import (
     sample_focus,
 )
 from scenes.own_content import Replaceable
+from scenes.people import sample_person, statue
 from scenes.planting import Garden, boulders, grass, plants, trees, undergrowth
 from scenes.shapes.landforms import Landscape
 from scenes.shapes.masonry import Archway, BlockWall, Column, House, Steps
-from scenes.shapes.plants import Bamboo, Conifer, Palm, Tree
+from scenes.shapes.trees import Bamboo, Conifer, Palm, Tree
 from scenes.spec import Light, Scene, World
 from scenes.stage import Spot, Stage
 from scenes.stuffs import (

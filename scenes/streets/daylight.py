@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenes.drawing import chance, log_uniform, uniform
+from scenes.painting import shade
 from scenes.spec import SunLight, World
 from scenes.streets.config import DrivingConfig
 from scenes.textures.sky import Sky
-from scenes.textures.streets import shade
 
 
 @dataclass(frozen=True)

@@ -7,27 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from scenes.drawing import chance, choose, integer, log_uniform, new_seed, uniform
-from scenes.painting import Srgb, sample_palette
+from scenes.painting import Srgb, sample_palette, shade
 from scenes.shapes.buildings import NOMINAL_BAY_M, HouseDesign
 from scenes.spec import Material, Texture
+from scenes.textures.foliage import Bark, Foliage, Grass
+from scenes.textures.houses import Plaster, RoofTiles, WindowPanes
 from scenes.textures.layers import Layered
 from scenes.textures.marks import BlurredShapes, DeadLeaves, Facade, GlyphRows
 from scenes.textures.noise import WoodPlanks
 from scenes.textures.plain import NearTextureless, SolidColor
-from scenes.textures.streets import (
-    Asphalt,
-    Bark,
-    Foliage,
-    Grass,
-    Paving,
-    Plaster,
-    RoadSign,
-    RoofTiles,
-    WheelFace,
-    WindowPanes,
-    WornPaint,
-    shade,
-)
+from scenes.textures.streets import Asphalt, Paving, RoadSign, WheelFace, WornPaint
 from scenes.textures.tiles import Bricks, Plaid, Stripes
 
 WINDOW_FRAMES: tuple[Srgb, ...] = (

@@ -11,31 +11,17 @@ from scipy.spatial.transform import Rotation
 
 from scenes.drawing import chance, choose, uniform
 from scenes.metric import MetricShape, standing
-from scenes.painting import Srgb
+from scenes.painting import Srgb, shade
+from scenes.shapes.cars import CarBody, CarDesign, CarGlass, CarLamps, CarTrim
 from scenes.shapes.road import Course
-from scenes.shapes.vehicles import (
-    MIRROR_M,
-    CarBody,
-    CarDesign,
-    CarGlass,
-    CargoBox,
-    CarLamps,
-    CarTrim,
-    VanBody,
-    VanDesign,
-    VanGlass,
-    VanLamps,
-    VanTrim,
-    Wheel,
-    WheelSet,
-)
+from scenes.shapes.vans import CargoBox, VanBody, VanDesign, VanGlass, VanLamps, VanTrim
+from scenes.shapes.wheels import MIRROR_M, Wheel, WheelSet
 from scenes.spec import SceneObject
 from scenes.streets import finishes
 from scenes.streets.assembly import Assembly
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive, Lane
-from scenes.textures.streets import shade
 
 PARKING_M = 2.35
 """Width of a parking lane."""

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scenes.deformations import DEFORMATIONS
 from scenes.deformations.articulated import Articulated, Joint
 from scenes.deformations.sway import Sway
-from scenes.figures import Coat, Figure, sample_creature, sample_person
+from scenes.figures import Coat, Figure, sample_creature
+from scenes.people import sample_person
 from scenes.serialization import from_plain, to_plain
 from scenes.spec import Deformation
 

@@ -13,8 +13,10 @@ from scipy.spatial import ConvexHull
 
 from scenes import sample_scene, scene_from_json, scene_to_json
 from scenes.families.driving import DrivingConfig
+from scenes.shapes.cars import CarBody
 from scenes.shapes.road import Course, RoadStrip
-from scenes.shapes.vehicles import CarBody, VanBody, Wheel
+from scenes.shapes.vans import VanBody
+from scenes.shapes.wheels import Wheel
 from scenes.spec import Scene, SceneObject
 
 SMALL = DrivingConfig(width=96, height=54)
