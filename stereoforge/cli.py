@@ -85,8 +85,10 @@ def _plain(complaint: str) -> str:
     ):
         kind = {"INT": "a whole number", "FLOAT": "a number"}[wanted[2]]
         return f"{wanted[1]} takes {kind}, not {wanted[3]!r}"
-    if wanted := re.search(r"Error parsing (\S+): could not convert string to float: '(.*)'", complaint):
-        return f"{wanted[1]} takes a number, not {wanted[2]!r}"
+    if wanted := re.search(
+        r"Error parsing (\S+): (?:invalid literal for int|could not convert).*: '(.*)'", complaint
+    ):
+        return f"{wanted[1]} takes a {'whole ' * ('int()' in complaint)}number, not {wanted[2]!r}"
     if choices := re.search(r"Expected one of \((.*)\)", complaint):
         names = sorted(name for name in re.findall(r"'([^']*)'", choices[1]) if name != "None")
         return f"{complaint[: choices.start()]}Expected one of {', '.join(names)}."

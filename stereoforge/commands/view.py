@@ -32,6 +32,8 @@ class View:
     def run(self) -> None:
         if self.scenes < 1:
             raise UsageError(f"--scenes must be at least 1, got {self.scenes}")
+        if self.out.is_dir():
+            raise UsageError(f"--out {self.out} is a folder; it takes the file to write")
         from datagen.comparison import write_comparison
         from datagen.gallery import write_gallery
 

@@ -116,6 +116,9 @@ def test_no_data_and_wrong_folders_are_sentences(tmp_path: Path, refused: Callab
         ):
             assert str(folder) in refused(1, *command)
     assert "neither empty nor a data set" in refused(1, *RenderTiny, "--out", empty)
+    assert "is a folder" in refused(2, "view", missing, "--out", empty)
+    assert "--scenes takes a whole number" in refused(2, "view", missing, "--out", empty, "--scenes", "x")
+    assert "--scenes must be at least 1" in refused(2, "view", missing, "--out", empty, "--scenes", "0")
     assert "is a file, not a folder" in refused(1, *RenderTiny, "--out", empty / "note.txt")
     assert not (tmp_path / "page.html").exists()
 
