@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from refine.solvers.halves import Halves, halves, widened
 from refine.solvers.hierarchy import Hierarchy, build_hierarchy
 from refine.solvers.linear import Problem
 from refine.solvers.rows import Indices, Rows
 from refine.solvers.stencils import Singles, bands, couplings_of
-from refine.solvers.windows import DAMPING, narrowed, widened
+from refine.solvers.windows import DAMPING
 
 STRONGER = np.float32(3)
 """Times as strong as what it stands for, the coupling of a detour has to be."""
@@ -39,9 +39,9 @@ class Elimination:
 
     tau: Singles
     """(H, W) the M-matrix's excess."""
-    ties: NDArray[np.uint16]
+    ties: Halves
     """(4, H, W) its couplings to the right, downwards, down right, and of the pixel to the right to the one below,
-    in bfloat16 (`refine.solvers.windows`): all below is made of the rounded ones."""
+    in bfloat16 (`refine.solvers.halves`): all below is made of the rounded ones."""
     relax: Singles
     """(H, W) 1 / diagonal at eliminated pixels. At the others minus `DAMPING` / diagonal of what is left, once that
     is known, and 0 before."""
@@ -134,8 +134,7 @@ def eliminate_black(problem: Problem, tau: Singles, color_scale: float) -> Elimi
     side = np.full(tau.shape, _NOWHERE, np.int8)
     _detours(ties, side)
     _take_over(side, ties)
-    rounded, relax = np.empty(ties.shape, np.uint16), np.zeros_like(tau)
-    _round(ties, rounded)
+    rounded, relax = halves(ties), np.zeros_like(tau)
     _choose(tau, rounded, relax)
     return Elimination(tau, rounded, relax)
 
@@ -208,14 +207,6 @@ def _take_over(side, ties):
         for x in range(2, side.shape[1] - 2):
             if side[y, x] != _NOWHERE:
                 ties[3 - (y + x) % 2, y, x] = 0
-
-
-@njit(cache=True, parallel=True)
-def _round(ties, rounded):
-    for y in prange(ties.shape[1]):
-        for k in range(4):
-            for x in range(ties.shape[2]):
-                rounded[k, y, x] = narrowed(ties[k, y, x])
 
 
 @njit(cache=True, parallel=True)

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit, prange
 
 from refine.solvers.chessboard import Coarsening, coarsen
+from refine.solvers.halves import halves, widened
 from refine.solvers.krylov import solve_iteratively
 from refine.solvers.linear import LinearSolution, Problem
 from refine.solvers.stencils import Singles, StencilOperator, data_weight, system_of
@@ -43,7 +44,7 @@ class Cycle:
     def __init__(self, operator: StencilOperator, below: Coarsening) -> None:
         self._operator = operator
         self._below = below
-        self._step = np.float32(DAMPING) * operator.inverse_diagonal()
+        self._step = halves(np.float32(DAMPING) * operator.inverse_diagonal())
         self._x, self._left = np.zeros_like(operator.tau), np.zeros_like(operator.tau)
 
     def __call__(self, residual: Singles, out: Singles) -> None:
@@ -61,4 +62,4 @@ class Cycle:
 def _first(step, residual, x):
     for y in prange(x.shape[0]):
         for j in range(x.shape[1]):
-            x[y, j] = step[y, j] * residual[y, j]
+            x[y, j] = widened(step[y, j]) * residual[y, j]

@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from refine.solvers.halves import Halves, widened
 from refine.solvers.linear import Problem, SolverError
 from refine.weights import NEIGHBORS, Floats
 
@@ -78,7 +79,7 @@ class StencilOperator:
         """b - A x into `out`, worked out in the precision of `x`; its squared norm."""
         return _remainder(self.planes, self.tau, b, x, out)
 
-    def smooth(self, b: Singles, step: Singles, x: Singles, out: Singles) -> None:
+    def smooth(self, b: Singles, step: Halves, x: Singles, out: Singles) -> None:
         """x + step (b - A x) into `out`."""
         _smooth(self.planes, self.tau, b, step, x, out)
 
@@ -440,7 +441,7 @@ def _smooth(a, tau, b, step, x, out):
         _row(a, tau, x, y, row)
         here, aim, steps = x[y + 2], b[y + 2], step[y + 2]
         for j in range(row.size):
-            row[j] = here[j] + steps[j] * (aim[j] - row[j])
+            row[j] = here[j] + widened(steps[j]) * (aim[j] - row[j])
 
 
 @njit(cache=True, parallel=True)

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from refine.solvers.halves import Halves, narrowed, widened
 from refine.solvers.rows import Indices, Rows
 from refine.solvers.stencils import Singles
 
@@ -39,7 +40,7 @@ class WindowSmoother:
     """Of each diagonal, its first coupling."""
     column: NDArray[np.unsignedinteger[Any]]
     """Less the window's first unknown, plus `back`."""
-    value: NDArray[np.uint16]
+    value: Halves
     back: int
     step: Singles
     """`DAMPING` / diagonal, 0 where that is 0."""
@@ -121,18 +122,6 @@ def _arrange(start, old_column, old_value, excess, position, first, begin, colum
                 held += widened(value[at])
             step[position[i]] = DAMPING / np.float32(held) if held > 0 else 0
     begin[begin.size - 1] = column.size
-
-
-@njit(cache=True)
-def narrowed(single):
-    """bfloat16 of float32, rounded."""
-    return (np.float32(single).view(np.uint32) + np.uint32(0x8000)) >> np.uint32(16)
-
-
-@njit(cache=True)
-def widened(half):
-    """float32 of bfloat16."""
-    return np.uint32(np.uint32(half) << np.uint32(16)).view(np.float32)
 
 
 @njit(cache=True, fastmath={"contract"})
