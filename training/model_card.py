@@ -27,6 +27,7 @@ _FIGURES = {
     "refined_gradient": "gradient error of the refined disparity on smooth pixels, px per px",
     "gradient": "gradient error on smooth pixels, px per px",
     "gradient_regressor": "the regressor's gradient error there",
+    "gradient_matched": "the matcher's gradient error there",
     "auc": "area under the sparsification curve",
     "auc_random": "area of a random order",
     "auc_optimal": "area of the best order",

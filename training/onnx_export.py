@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,8 +11,9 @@ from pathlib import Path
 import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
+from torch.onnx import OnnxExporterError
 
-from storage import replacing
+from storage import replacing, temporary_folder
 from training.errors import TrainingError
 from training.inference import head_inputs, network_size
 from training.networks import ConfNet, Correlation1D, DispNetCorr1D, GradNet
@@ -80,17 +83,28 @@ def export_model(run: Path, out: Path) -> ExportedModel:
     The file is run by onnxruntime on two sizes and compared with torch before it is kept.
 
     Raises:
-        TrainingError: no regressor, damaged weights, or answers that differ.
+        TrainingError: no regressor, damaged weights, a network that ONNX cannot express, or answers that differ.
     """
     networks = ExportedNetworks(*StereoPredictor(run).networks).eval()
-    path = out / FILE_NAME
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as temporary:
-        _write(networks, temporary)
-        difference = max(_compare(networks, temporary, size) for size in ((64, 128), (128, 192)))
+    with temporary_folder() as folder:
+        written = folder / FILE_NAME
+        try:
+            _write(networks, written)
+        except OnnxExporterError as error:
+            raise TrainingError(f"{run}: torch cannot write it as ONNX: {_first_sentence(error)}") from error
+        difference = max(_compare(networks, written, size) for size in ((64, 128), (128, 192)))
         if not difference <= TOLERANCE:
             raise TrainingError(f"{run}: onnxruntime's answers differ from torch's by {difference:.2g}")
+        path = out / FILE_NAME
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as temporary:
+            shutil.copyfile(written, temporary)
     return ExportedModel(path, networks.outputs, difference)
+
+
+def _first_sentence(error: Exception) -> str:
+    """torch's message goes on with the whole graph."""
+    return re.split(r"[.\n]\s", str(error).strip(), maxsplit=1)[0]
 
 
 def _write(networks: ExportedNetworks, path: Path) -> None:

@@ -78,7 +78,8 @@ class Refine:
         prediction, notes = predict_pair(left, right, given, self.weights, self.device, self.predictor)
         assert prediction.confidence is not None
         assert prediction.gradient is not None
-        solution = ours.solve(prediction.disparity, prediction.confidence, prediction.gradient, left)
+        with console.status("refining; the first time after an install this compiles for a minute"):
+            solution = ours.solve(prediction.disparity, prediction.confidence, prediction.gradient, left)
         deviation = None
         if self.deviation:
             deviation = ours.sample(

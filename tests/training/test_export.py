@@ -6,11 +6,13 @@ import numpy as np
 import onnxruntime
 import pytest
 import torch
+import torch.nn.functional as F  # noqa: N812
 
+from stereoforge.shipped import SHIPPED_WEIGHTS
 from tests.training.test_predict import edit_description, save_run
 from training.errors import TrainingError
 from training.model_card import write_model_card
-from training.networks import Correlation1D
+from training.networks import ConfNet, Correlation1D
 from training.onnx_export import ShiftedCorrelation, export_model
 from training.predict import StereoPredictor
 
@@ -48,6 +50,27 @@ def test_onnx_says_what_the_predictor_says(heads: bool, tmp_path: Path) -> None:
         assert expected.gradient is not None
         np.testing.assert_allclose(answers[1][0, 0], expected.confidence, atol=1e-3)
         np.testing.assert_allclose(answers[2][0].transpose(1, 2, 0), expected.gradient, atol=1e-3)
+
+
+def test_the_shipped_networks_can_be_exported(tmp_path: Path) -> None:
+    """Their heads see more than the regressor's features."""
+    exported = export_model(SHIPPED_WEIGHTS, tmp_path)
+    assert exported.outputs == ("disparity", "confidence", "gradient")
+
+
+def test_what_onnx_cannot_express_is_a_sentence_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save_run(tmp_path)
+
+    def halved(_: ConfNet, image: torch.Tensor, *__: torch.Tensor) -> torch.Tensor:
+        return F.interpolate(image, size=[side // 2 for side in image.shape[-2:]], mode="area")
+
+    monkeypatch.setattr(ConfNet, "confidence", halved)
+    with pytest.raises(TrainingError, match="cannot write it as ONNX") as refusal:
+        export_model(tmp_path, tmp_path / "onnx")
+    assert len(str(refusal.value)) < 400
+    assert not (tmp_path / "onnx").exists()
 
 
 def test_a_head_of_another_regressor_is_not_exported(tmp_path: Path) -> None:

@@ -103,6 +103,8 @@ def _activation(name: Activation) -> nn.Module:
 def _resized(maps: Tensor, height: int, width: int) -> Tensor:
     if maps.shape[-2:] == (height, width):
         return maps
+    if maps.shape[-2] == 2 * height and maps.shape[-1] == 2 * width:
+        return F.avg_pool2d(maps, 2)  # the same means, and in ONNX too
     if maps.shape[-2] > height:
         return F.interpolate(maps, size=(height, width), mode="area")
     return F.interpolate(maps, size=(height, width), mode="bilinear", align_corners=False)
