@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 import tyro
 from numpy.typing import NDArray
 
@@ -16,13 +17,18 @@ from stereoforge.shipped import SHIPPED_WEIGHTS
 from stereoforge.values import shown
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from refine.mrf import MRFSolution
     from training.predict import Prediction
 
 POSTERIOR_SAMPLES = 32
 """For --deviation: each pixel's deviation is off by an eighth of itself."""
+
+
+FEW_KNOWN = 0.1
+"""A disparity from elsewhere that is known at a smaller share of the pixels is taken for a mistake."""
+LOW_CONFIDENCE = 0.15
+"""A mean confidence below this, too: the shipped networks have 0.5 on a pair of photographs, 0.1 with its views
+swapped."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +92,7 @@ class Refine:
                 prediction.disparity, prediction.confidence, prediction.gradient, left, POSTERIOR_SAMPLES
             )
         self._write(left, prediction, solution, deviation)
-        for note in notes:
+        for note in (*notes, *_doubts(None if given is None else given[0], prediction.confidence)):
             console.print(note, markup=False)
         console.print(
             f"{self.out}: disparity {solution.disparity.min():.1f} to {solution.disparity.max():.1f} px, refined in "
@@ -124,3 +130,22 @@ class Refine:
         write_gradient(self.out / "gradient.exr", prediction.gradient, inside)
         picture = overview_picture(left, prediction.disparity, prediction.confidence, refined, deviation)
         write_png(self.out / "overview.png", picture)
+
+
+def _doubts(given: NDArray[np.float32] | None, confidence: NDArray[np.float32]) -> list[str]:
+    """What looks like views that are swapped, or a disparity in another unit or of the other sign."""
+    doubts = []
+    if given is not None:
+        known = np.isfinite(given).mean()
+        if known < FEW_KNOWN:
+            doubts.append(
+                f"only {known:.1%} of the disparity is known: is it positive, in pixels of the left view?"
+            )
+        if (largest := np.nanquantile(given, 0.99)) < 1:
+            doubts.append(f"the disparity is hardly anywhere above {largest:.2g} px: is it in pixels?")
+    if confidence.mean() < LOW_CONFIDENCE:
+        doubts.append(
+            f"the confidence is low nearly everywhere (mean {confidence.mean():.2f}): are the views rectified, the "
+            "left one first, and a disparity from elsewhere in pixels?"
+        )
+    return doubts

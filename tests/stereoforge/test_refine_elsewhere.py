@@ -82,6 +82,25 @@ def test_a_foreign_disparity_gets_better_without_any_network(world, tmp_path, so
     assert {path.name for path in (tmp_path / "r").iterdir()} >= {"gradient.exr", "overview.png"}
 
 
+def test_a_disparity_of_the_wrong_sign_or_unit_and_swapped_views_are_doubted(world, tmp_path, capsys):
+    folder, truth = world
+    for name, wrong, doubt in (
+        ("negative", np.where(np.arange(128) < 4, truth, -truth), "of the disparity is known"),
+        ("normalised", truth / 128, "is it in pixels?"),
+    ):
+        write_pfm(tmp_path / f"{name}.pfm", wrong.astype(np.float32))
+        refine(folder, tmp_path / name, "--disparity", tmp_path / f"{name}.pfm")
+        assert doubt in " ".join(capsys.readouterr().out.split())
+    refine(folder, tmp_path / "right", "--disparity", folder / "given.pfm")
+    said = " ".join(capsys.readouterr().out.split())
+    assert "is known" not in said
+    assert "is it in pixels" not in said
+    swapped = ("refine", folder / "right.png", folder / "left.png", "--out", tmp_path / "swapped")
+    with pytest.raises(SystemExit):
+        main([str(word) for word in swapped])
+    assert "the confidence is low nearly everywhere" in " ".join(capsys.readouterr().out.split())
+
+
 def test_the_run_folders_networks_judge_it(world, tmp_path, capsys):
     """With both networks in the run folder nothing is done by hand, and the confidence is the network's."""
     folder, _ = world
