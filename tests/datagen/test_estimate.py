@@ -56,7 +56,7 @@ def test_a_split_of_a_recipe_has_the_recipes_count(
     with pytest.raises(SystemExit) as end:
         main([*flags, "test"])
     assert end.value.code == 0
-    assert "2 test scenes" in capsys.readouterr().out
+    assert "2 test scenes" in " ".join(capsys.readouterr().out.split())
     with pytest.raises(SystemExit) as end:
         main([*flags, "val"])
     assert end.value.code == 2
