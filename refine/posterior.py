@@ -18,7 +18,7 @@ from refine.solvers.chessboard import coarsen
 from refine.solvers.krylov import krylov
 from refine.solvers.linear import SolverError
 from refine.solvers.multigrid import COLOR_SCALE, MAX_ITERATIONS, Cycle
-from refine.solvers.stencils import Couplings, couplings_of, crop, system_of
+from refine.solvers.stencils import Couplings, couplings_of, crop, data_weight, system_of
 from refine.weights import NEIGHBORS, Floats
 
 TOLERANCE = 1e-3
@@ -57,9 +57,10 @@ def posterior_deviation(
     if samples < 1:
         raise ValueError(f"samples must be at least 1, got {samples}")
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
-    parts = couplings_of(problem)
-    operator = system_of(problem, parts.tau).operator
-    cycle = Cycle(operator, coarsen(problem, parts.tau, COLOR_SCALE))
+    tau = data_weight(problem)
+    parts = couplings_of(problem, tau)
+    operator = system_of(problem, tau).operator
+    cycle = Cycle(operator, coarsen(problem, tau, COLOR_SCALE))
     rng = np.random.default_rng(seed)
     total = np.zeros(problem.shape)
     for _ in range(samples):

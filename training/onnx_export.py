@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 from torch.onnx import OnnxExporterError
 
-from storage import replacing, temporary_folder
+from storage import temporary_folder, write_bytes
 from training.errors import TrainingError
 from training.inference import head_inputs, network_size
 from training.networks import ConfNet, Correlation1D, DispNetCorr1D, GradNet
@@ -96,9 +95,7 @@ def export_model(run: Path, out: Path) -> ExportedModel:
         if not difference <= TOLERANCE:
             raise TrainingError(f"{run}: onnxruntime's answers differ from torch's by {difference:.2g}")
         path = out / FILE_NAME
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as temporary:
-            shutil.copyfile(written, temporary)
+        write_bytes(path, written.read_bytes())
     return ExportedModel(path, networks.outputs, difference)
 
 

@@ -129,7 +129,7 @@ def eliminate_black(problem: Problem, tau: Singles, color_scale: float) -> Elimi
     """
     ties = np.zeros((4, *tau.shape), np.float32)
     for first, last in bands(problem.shape[0]):
-        parts = couplings_of(problem, first, last)
+        parts = couplings_of(problem, tau, first, last)
         _tie(parts.weights, parts.color, parts.axial, np.float32(color_scale), first, ties)
     side = np.full(tau.shape, _NOWHERE, np.int8)
     _detours(ties, side)

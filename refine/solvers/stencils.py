@@ -137,22 +137,16 @@ def data_weight(problem: Problem) -> Singles:
     return pad(np.maximum(problem.confidence, problem.parameters.confidence_floor))
 
 
-def couplings_of(problem: Problem, first: int = 0, last: int | None = None) -> Couplings:
-    """Read the couplings of these rows off a refinement's inputs; of all by default."""
+def couplings_of(problem: Problem, tau: Singles, first: int = 0, last: int | None = None) -> Couplings:
+    """Read the couplings of these rows off a refinement's inputs and its `data_weight`; of all by default."""
     parameters = problem.parameters
-    height, width = problem.shape
-    last = height if last is None else last
-    shape = (last - first + 2 * MARGIN, width + 2 * MARGIN)
-    around = slice(max(0, first - MARGIN), last + MARGIN)
-    above = around.start - first + MARGIN
-    tau = np.zeros(shape, np.float32)
-    inside = tau[above:, MARGIN:-MARGIN][: min(height, around.stop) - around.start]
-    np.maximum(problem.confidence[around], parameters.confidence_floor, out=inside, casting="same_kind")
+    last = problem.shape[0] if last is None else last
+    tau = tau[first : last + 2 * MARGIN]
     made = Couplings(
         tau=tau,
-        weights=np.zeros((len(NEIGHBORS), *shape), np.float32),
-        axial=np.zeros((2, *shape), np.float32),
-        color=np.zeros(shape, np.float32),
+        weights=np.zeros((len(NEIGHBORS), *tau.shape), np.float32),
+        axial=np.zeros((2, *tau.shape), np.float32),
+        color=np.zeros_like(tau),
     )
     phi = np.exp(np.arange(_differences_until(parameters.sigma_r)) * (-0.5 / parameters.sigma_r**2))
     phi[-1] = 0
@@ -183,7 +177,7 @@ def system_of(problem: Problem, tau: Singles) -> System:
     )
     b = np.zeros(tau.shape)
     for first, last in bands(problem.shape[0]):
-        parts = couplings_of(problem, first, last)
+        parts = couplings_of(problem, tau, first, last)
         (_square if exact else _point)(parts.weights, parts.color, parts.axial, first, operator.planes)
         _gather_right_hand_side(problem.disparity, problem.gradient, parts.tau, parts.axial, first, b)
     size = float(np.linalg.norm(b))
