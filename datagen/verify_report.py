@@ -47,5 +47,5 @@ class VerifyReport:
         return (
             f"{self.root}: {found} in {self.scenes} scenes, {self.frames} frames, {self.files} files, "
             f"{self.bytes_read / 1e6:.1f} MB read in {self.seconds:.1f} s "
-            f"({self.megabytes_per_second:.0f} MB/s)"
+            f"({self.megabytes_per_second:.1f} MB/s)"
         )

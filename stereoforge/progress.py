@@ -1,27 +1,13 @@
-"""One look for every long job: what, how far, how long still."""
+"""Where every command says what it does, and how far its long jobs are."""
 
 from __future__ import annotations
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+
+from viewing import JobProgress
 
 console = Console(highlight=False)
 
 
-def progress_bar() -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-    )
+def progress_bar() -> JobProgress:
+    return JobProgress(console)

@@ -20,15 +20,6 @@ def shown(metavar: str, default: object = None) -> Any:
     )
 
 
-def shown_duration(seconds: float) -> str:
-    """A time with its two largest units: "2 h 5 min", "3 min 20 s", "7 s"."""
-    whole = round(seconds)
-    hours, minutes = whole // 3600, whole % 3600 // 60
-    if hours:
-        return f"{hours} h {minutes} min"
-    return f"{minutes} min {whole % 60} s" if minutes else f"{whole} s"
-
-
 def parse_size(text: str, flag: str = "size") -> tuple[int, int]:
     """(width, height) of "960x540"; `flag` names the flag in errors."""
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)

@@ -8,16 +8,9 @@ from typing import Any
 
 import pytorch_lightning as pl
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 from training.tasks import StereoTask
+from viewing import JobProgress
 
 
 class BestWeights(pl.Callback):
@@ -59,18 +52,7 @@ class RunProgress(pl.Callback):
 
     def __init__(self, title: str) -> None:
         self._console = Console(stderr=True)
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("loss {task.fields[loss]:.3f}"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=self._console,
-            transient=True,
-            disable=not self._console.is_terminal,
-        )
+        self._progress = JobProgress(self._console, "loss {task.fields[loss]:.3f}", transient=True)
         self._title = title
 
     def on_train_start(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002

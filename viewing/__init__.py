@@ -20,13 +20,16 @@ from viewing.pictures import (
     side_by_side,
     stacked,
 )
+from viewing.progress import JobProgress, duration
 
 __all__ = [
+    "JobProgress",
     "Picture",
     "anaglyph",
     "confidence_picture",
     "data_uri",
     "disparity_picture",
+    "duration",
     "enlarged",
     "error_picture",
     "gradient_picture",

@@ -95,8 +95,8 @@ class Evaluate:
             console.print(note, markup=False)
         for name, reason in sets[0].evaluation.skipped.items():
             console.print(f"{name} did not run: {reason}", markup=False)
-        frames = sum(len(each.evaluation.frames) for each in sets)
-        console.print(f"{files.html}: {frames} frames of {len(sets)} sets", markup=False)
+        frames = ", ".join(f"{len(each.evaluation.frames)} of {each.name}" for each in sets)
+        console.print(f"{files.html}: frames evaluated: {frames}", markup=False)
         if self.submission:
             count = write_submission(to_submit, predictors, settings.ours, self.submission)
             console.print(f"{self.submission}: {count} disparities", markup=False)

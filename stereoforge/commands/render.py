@@ -24,8 +24,9 @@ from datagen.render import SCENE_TIMEOUT_S, local_executor, ray_executor
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console, progress_bar
-from stereoforge.values import parse_histogram, parse_range, parse_shard, parse_size, shown, shown_duration
+from stereoforge.values import parse_histogram, parse_range, parse_shard, parse_size, shown
 from storage import open_tree, temporary_folder
+from viewing import duration
 
 DEFAULT_FAMILY = "flying_things"
 DEFAULT_SCENES = 20
@@ -160,7 +161,7 @@ class Render:
                 f"{', '.join(recipe.passes)}, with {', '.join(kinds)}"
             )
             console.print(
-                f"  about {shown_duration(found.seconds)} on all cores of this machine, "
+                f"  about {duration(found.seconds)} on all cores of this machine, "
                 f"{found.scene_seconds:.1f} s a scene"
             )
             console.print(

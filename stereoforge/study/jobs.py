@@ -12,10 +12,12 @@ from typing import Any
 
 from stereoforge.progress import console
 from storage import write_text
+from viewing import duration
 
 FINISHED = "finished.json"
 """Written last into a job's folder, with the settings that named it."""
 KEY_LENGTH = 12
+_TRUSTED_SECONDS = 600.0
 
 
 @dataclass(frozen=True)
@@ -63,9 +65,8 @@ def run_jobs(jobs: Sequence[Job]) -> None:
     if len(missing) < len(jobs):
         console.print(f"{len(jobs) - len(missing)} of {len(jobs)} steps are done already")
     for job in missing:
-        pace = (time.monotonic() - began) / expected if expected else 1.0
         place = jobs.index(job) + 1
-        left = duration((ahead - expected) * pace)
+        left = duration((ahead - expected) * _pace(time.monotonic() - began, expected))
         console.print(
             f"step {place} of {len(jobs)}: {job.title}; about {left} left of the whole", markup=False
         )
@@ -75,9 +76,7 @@ def run_jobs(jobs: Sequence[Job]) -> None:
         expected += job.expected_seconds
 
 
-def duration(seconds: float) -> str:
-    """A time as one says it: "40 s", "12 min", "3 h 05 min"."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60:02d} min"
+def _pace(elapsed: float, expected: float) -> float:
+    """How many times the guesses it takes: the guesses count as much as their first ten minutes, so that the first
+    step, which may be a short one, does not decide about hours."""
+    return (elapsed + _TRUSTED_SECONDS) / (expected + _TRUSTED_SECONDS)

@@ -20,7 +20,7 @@ from training.presets import find_preset
 TRAINING_SPLITS = ("train", "val")
 TEST_SPLITS = ("test",)
 NETWORKS = ("regressor", "confnet", "gradnet", "regressor_f")
-"""What is trained on a domain, in this order; the last on the subject only."""
+"""What is trained on a domain, in this order; the last on the subject only, where its row is asked for."""
 _CONVERTER = cattrs.Converter(forbid_extra_keys=True)
 
 

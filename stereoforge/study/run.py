@@ -185,12 +185,16 @@ class _Study:
 
     def _networks_of(self, name: str) -> dict[str, Job]:
         jobs: dict[str, Job] = {}
-        for task in NETWORKS if name == self.plan.subject else NETWORKS[:-1]:
+        for task in NETWORKS if self._compares_fine_tuning(name) else NETWORKS[:-1]:
             steps = self.plan.domains[name].steps.get(task)
             jobs[task] = self._training_job(name, task, name, steps, jobs.get("regressor"))
         if self.plan.forest and name == self.plan.subject:
             jobs["rdf"] = self._forest_job(name, jobs["regressor"])
         return jobs
+
+    def _compares_fine_tuning(self, name: str) -> bool:
+        """Whether `regressor_f` is a row of any table of the networks of this domain."""
+        return any("regressor_f" in self._methods(name, test) for test in self.plan.test)
 
     def _forest_job(self, name: str, regressor: Job) -> Job:
         data, forest = self.training_data[name], PLANS[self.plan.preset]

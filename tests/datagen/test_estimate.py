@@ -18,7 +18,6 @@ from scenes import FAMILIES, FamilyConfig
 from scenes.shapes.basic import Box, Superquadric
 from scenes.shapes.revolved import Cylinder
 from stereoforge.cli import main
-from stereoforge.values import shown_duration
 
 FOLDER = Path(__file__).parents[2] / "recipes"
 RECIPES = [path for path in sorted(FOLDER.glob("*.yaml")) if not path.stem.startswith("study")]
@@ -143,10 +142,3 @@ def test_recipes_that_make_no_sense_are_refused(change: dict[str, Any], sentence
 def test_a_file_that_is_no_recipe_is_said_so(text: str) -> None:
     with pytest.raises(DatasetError, match=r"^it is not a valid recipe: it has no settings"):
         recipe_from_text(text.encode(), "it")
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"), [(6.6, "7 s"), (200, "3 min 20 s"), (7530, "2 h 5 min"), (360000, "100 h 0 min")]
-)
-def test_durations_read_well(seconds: float, text: str) -> None:
-    assert shown_duration(seconds) == text

@@ -6,6 +6,7 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,7 +20,7 @@ from stereoforge.cli import main
 from stereoforge.errors import UsageError
 from stereoforge.study import DomainPlan, StudyPlan, StudyResult, read_plan, run_study
 from stereoforge.study.gap import Gap, gaps, summary
-from stereoforge.study.jobs import duration, make_job, run_jobs
+from stereoforge.study.jobs import Job, make_job, run_jobs
 from stereoforge.study.plan import NETWORKS
 from tests.refine.worlds import toy_frame
 from tests.stereoforge.test_submission import kitti_set
@@ -56,7 +57,7 @@ def tiny_plan(**changes: Any) -> StudyPlan:
         preset="tiny",
         fine_tuning_steps=1,
         forest=True,
-        methods=("regressor", "gradnet", "ours", "ours_conf_gt"),
+        methods=("regressor", "regressor_f", "gradnet", "ours", "ours_conf_gt"),
     )
     return replace(plan, **changes)
 
@@ -135,6 +136,25 @@ def test_the_shipped_plan_can_be_rendered() -> None:
     assert (dict(tuning.scenes), tuning.world.frames) == ({"val": plan.tuning_frames}, 1)
     assert plan.subject == "flying_things"
     assert plan.recipe("flying_things", ("train",)).scenes["train"] * 4 >= 1000
+
+
+def test_the_shipped_gap_trains_alike_everywhere() -> None:
+    plan = read_plan(Path(__file__).parents[2] / "recipes" / "gap.yaml")
+    assert set(plan.train) == set(plan.test) == set(FAMILIES)
+    assert len({tuple(domain.steps.items()) for domain in plan.domains.values()}) == 1
+    assert len({tuple(domain.scenes.items()) for domain in plan.domains.values()}) == 1
+
+
+@pytest.mark.parametrize("compared", [True, False])
+def test_the_fine_tuned_rival_is_trained_only_to_be_compared(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, compared: bool
+) -> None:
+    asked: list[Job] = []
+    monkeypatch.setattr("stereoforge.study.run.run_jobs", asked.extend)
+    rows = ("regressor", "ours", *(("regressor_f",) if compared else ()))
+    with pytest.raises(ValueError, match="not a whole evaluation"):  # nothing was run
+        run_study(tiny_plan(methods=rows), tmp_path)
+    assert sum("training the regressor_f" in job.title for job in asked) == compared
 
 
 @pytest.mark.parametrize(
@@ -216,8 +236,16 @@ def test_wrong_flags_are_one_sentence(
     assert not (tmp_path / "out").exists()
 
 
-def test_durations_read_as_one_says_them() -> None:
-    assert [duration(seconds) for seconds in (3, 700, 11100)] == ["3 s", "12 min", "3 h 05 min"]
+def test_a_short_first_step_does_not_decide_about_hours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = iter([0.0, 0.0, 100.0])
+    monkeypatch.setattr("stereoforge.study.jobs.time", SimpleNamespace(monotonic=lambda: next(clock)))
+    first, second = (
+        make_job(tmp_path, name, name, {}, guess, lambda _: None) for name, guess in (("a", 1), ("b", 7200))
+    )
+    run_jobs([first, second])  # the first took a hundred times as long as guessed
+    assert "step 2 of 2: b; about 2 h 20 min left" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.slow
