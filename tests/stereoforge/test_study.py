@@ -139,7 +139,7 @@ def test_the_shipped_plan_can_be_rendered() -> None:
 
 
 def test_the_shipped_gap_trains_alike_everywhere() -> None:
-    plan = read_plan(Path(__file__).parents[2] / "recipes" / "gap.yaml")
+    plan = read_plan(Path(__file__).parents[2] / "recipes" / "study_gap.yaml")
     assert set(plan.train) == set(plan.test) == set(FAMILIES)
     assert len({tuple(domain.steps.items()) for domain in plan.domains.values()}) == 1
     assert len({tuple(domain.scenes.items()) for domain in plan.domains.values()}) == 1
