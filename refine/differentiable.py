@@ -5,7 +5,10 @@ gradient of a loss with respect to any of it costs one more solve: with A' lambd
 
     dLoss/dtheta = lambda' (db/dtheta - dA/dtheta S),
 
-whatever the solver, and with no memory kept of its iterations. Needs torch, which `import refine` does not.
+whatever the solver, and with no memory kept of its iterations. On CPUs the exact form, which is its own transpose, is
+solved by the kernels of `refine.solvers`, a sample at a time; the paper's form, and either on other devices, by torch's
+own operations, the batch at once (a CPU takes some fifteen times as long for that). Needs torch, which `import refine`
+does not.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
@@ -23,6 +27,9 @@ from torch.nn.functional import pad
 from refine.aggregation import AggregationCycle
 from refine.parameters import MRFParameters
 from refine.solvers import SolverError
+from refine.solvers.multigrid import GivenSystem
+from refine.solvers.stencils import Couplings, crop
+from refine.solvers.stencils import pad as padded
 from refine.system import Form
 from refine.weights import NEIGHBORS
 
@@ -31,6 +38,10 @@ Map = Callable[[Tensor], Tensor]
 DEFAULT_TOLERANCE = 1e-6
 """Relative residual."""
 MAX_ITERATIONS = 1000
+MAX_ROUNDS = 20
+"""Solves of what is left of a residual."""
+_SINGLE = 1e-6
+"""Share of a residual that is worth solving for with float32 coefficients."""
 
 
 @dataclass(frozen=True)
@@ -196,8 +207,8 @@ class _System:
         self._form = form
         self._parts = tuple(part.detach().double() for part in parts)
         self._singles = tuple(part.float() for part in self._parts)
-        self._diagonal = _diagonal(form, self._singles)
         self._cycles: dict[bool, AggregationCycle] = {}
+        self._kernels: list[GivenSystem] = []
 
     def solve(self, b: Tensor, start: Tensor, tolerance: float, transposed: bool = False) -> Tensor:
         """A x = b, or A' x = b, in b's precision; raises SolverError where the tolerance is not reached."""
@@ -205,11 +216,14 @@ class _System:
         def apply(x: Tensor) -> Tensor:
             return _apply(self._form, transposed, self._parts, x)
 
-        cycle = self._cycle(transposed and self._form == "paper")
-        method = _conjugate_gradients if self._form == "exact" else _bicgstab
         wanted = b.double()
-        x = method(apply, lambda r: cycle(r.float()).double(), wanted, start.double(), tolerance)
         norm = _norm(wanted)
+        if _has_kernels(self._form, wanted):
+            x = self._solve_by_kernels(apply, wanted, start.double(), tolerance * norm)
+        else:
+            cycle = self._cycle(transposed and self._form == "paper")
+            method = _conjugate_gradients if self._form == "exact" else _bicgstab
+            x = method(apply, lambda r: cycle(r.float()).double(), wanted, start.double(), tolerance)
         relative = _norm(wanted - apply(x)) / torch.where(norm > 0, norm, 1)
         # The recurrence's residual drifts from the true one by rounding.
         if not bool((relative <= max(2 * tolerance, 1e-12)).all()):
@@ -219,12 +233,45 @@ class _System:
             )
         return x.to(b.dtype)
 
+    def _solve_by_kernels(self, apply: Map, b: Tensor, x: Tensor, target: Tensor) -> Tensor:
+        """By `refine.solvers`, a sample at a time. Its coefficients are float32; what they leave of the residual is
+        solved for again."""
+        if not all(bool(part.isfinite().all()) for part in self._singles):
+            return x  # which is then found to be no solution
+        if not self._kernels:
+            self._kernels = [GivenSystem(_couplings(*sample)) for sample in zip(*self._singles, strict=True)]
+        for _ in range(MAX_ROUNDS):
+            residual = b - apply(x)
+            left = _norm(residual)
+            open_ = torch.nonzero(left.flatten() > target.flatten()).flatten().tolist()
+            if not open_:
+                break
+            x = x.clone()
+            for i in open_:
+                share = max(float(target[i] / left[i]) / 2, _SINGLE)
+                found = self._kernels[i].solve(padded(residual[i].numpy(), np.float64), share)
+                x[i] += torch.from_numpy(crop(found.x))
+        return x
+
     def _cycle(self, transposed: bool) -> AggregationCycle:
         if transposed not in self._cycles:
             self._cycles[transposed] = AggregationCycle(
-                self._singles, lambda x: _apply(self._form, transposed, self._singles, x), self._diagonal
+                self._singles,
+                lambda x: _apply(self._form, transposed, self._singles, x),
+                _diagonal(self._form, self._singles),
             )
         return self._cycles[transposed]
+
+
+def _has_kernels(form: Form, b: Tensor) -> bool:
+    return form == "exact" and b.device.type == "cpu"
+
+
+def _couplings(tau: Tensor, axial_x: Tensor, axial_y: Tensor, color: Tensor, weights: Tensor) -> Couplings:
+    """Of one sample, as `refine.solvers` has them."""
+    axial = torch.stack([pad(axial_x, (0, 1)), pad(axial_y, (0, 0, 0, 1))])
+    weights = weights * torch.stack([_neighbor(torch.ones_like(tau), k) for k in range(8)])
+    return Couplings(*(padded(part.numpy()) for part in (tau, weights, axial, color)))
 
 
 def _dot(a: Tensor, b: Tensor) -> Tensor:

@@ -14,11 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from refine.mrf import checked_problem
 from refine.parameters import MRFParameters
-from refine.solvers.chessboard import coarsen
-from refine.solvers.krylov import krylov
 from refine.solvers.linear import SolverError
-from refine.solvers.multigrid import COLOR_SCALE, MAX_ITERATIONS, Cycle
-from refine.solvers.stencils import Couplings, couplings_of, crop, data_weight, system_of
+from refine.solvers.multigrid import GivenSystem
+from refine.solvers.stencils import Couplings, couplings_of, crop, data_weight
 from refine.weights import NEIGHBORS, Floats
 
 TOLERANCE = 1e-3
@@ -57,16 +55,14 @@ def posterior_deviation(
     if samples < 1:
         raise ValueError(f"samples must be at least 1, got {samples}")
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
-    tau = data_weight(problem)
-    parts = couplings_of(problem, tau)
-    operator = system_of(problem, tau).operator
-    cycle = Cycle(operator, coarsen(problem, tau, COLOR_SCALE))
+    parts = couplings_of(problem, data_weight(problem))
+    system = GivenSystem(parts)
     rng = np.random.default_rng(seed)
     total = np.zeros(problem.shape)
     for _ in range(samples):
         noise = _perturbation(parts, rng)
         size = float(np.linalg.norm(noise))
-        solved = krylov(operator, noise, TOLERANCE * size, cycle, MAX_ITERATIONS)
+        solved = system.solve(noise, TOLERANCE)
         if not solved.residual <= TOLERANCE * size:
             raise SolverError(
                 f"a sample of the posterior stopped at a relative residual of {solved.residual / size:.1e}, "

@@ -20,9 +20,8 @@ from numba import njit, prange
 
 from refine.solvers.halves import Halves, halves, widened
 from refine.solvers.hierarchy import Hierarchy, build_hierarchy
-from refine.solvers.linear import Problem
 from refine.solvers.rows import Indices, Rows
-from refine.solvers.stencils import Singles, bands, couplings_of
+from refine.solvers.stencils import MARGIN, CouplingRows, Singles, bands
 from refine.solvers.windows import DAMPING
 
 STRONGER = np.float32(3)
@@ -105,9 +104,9 @@ class Coarsening:
     """For vectors that are padded images, flat."""
 
 
-def coarsen(problem: Problem, tau: Singles, color_scale: float) -> Coarsening:
+def coarsen(tau: Singles, couplings: CouplingRows, color_scale: float) -> Coarsening:
     """The elimination and the hierarchy for a refinement's M-matrix (`eliminate_black`)."""
-    elimination = eliminate_black(problem, tau, color_scale)
+    elimination = eliminate_black(tau, couplings, color_scale)
     return Coarsening(elimination, grid_hierarchy(elimination))
 
 
@@ -121,15 +120,15 @@ def grid_hierarchy(elimination: Elimination) -> Hierarchy:
     return build_hierarchy(elimination.graph, arrange)
 
 
-def eliminate_black(problem: Problem, tau: Singles, color_scale: float) -> Elimination:
-    """The elimination from a refinement's M-matrix.
+def eliminate_black(tau: Singles, couplings: CouplingRows, color_scale: float) -> Elimination:
+    """The elimination from a refinement's M-matrix, for a padded tau.
 
     That has data and gradient terms as they are, and for the colour term the graph Laplacian with couplings
     color_scale (color_p w_pq + color_q w_qp).
     """
     ties = np.zeros((4, *tau.shape), np.float32)
-    for first, last in bands(problem.shape[0]):
-        parts = couplings_of(problem, tau, first, last)
+    for first, last in bands(tau.shape[0] - 2 * MARGIN):
+        parts = couplings(first, last)
         _tie(parts.weights, parts.color, parts.axial, np.float32(color_scale), first, ties)
     side = np.full(tau.shape, _NOWHERE, np.int8)
     _detours(ties, side)

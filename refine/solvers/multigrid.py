@@ -11,14 +11,25 @@ the iterations (figures in docs/solver.md).
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numba import njit, prange
 
 from refine.solvers.chessboard import Coarsening, coarsen
 from refine.solvers.halves import halves, widened
-from refine.solvers.krylov import solve_iteratively
+from refine.solvers.krylov import Iterated, krylov, solve_iteratively
 from refine.solvers.linear import LinearSolution, Problem
-from refine.solvers.stencils import Singles, StencilOperator, data_weight, system_of
+from refine.solvers.stencils import (
+    Couplings,
+    Singles,
+    StencilOperator,
+    couplings_of,
+    data_weight,
+    operator_of,
+    system_of,
+)
+from refine.weights import Floats
 
 MAX_ITERATIONS = 1000
 """Without the gradient term and with a large beta, hundreds are needed, and still faster than a direct solve."""
@@ -33,9 +44,32 @@ def solve_multigrid(problem: Problem, tolerance: float) -> LinearSolution:
     preconditioner."""
     tau = data_weight(problem)
     # The hierarchy first: while it is built, A and what belongs to it need not be there.
-    below = coarsen(problem, tau, COLOR_SCALE)
+    below = coarsen(tau, partial(couplings_of, problem, tau), COLOR_SCALE)
     system = system_of(problem, tau)
     return solve_iteratively(problem, system, tolerance, Cycle(system.operator, below), MAX_ITERATIONS)
+
+
+class GivenSystem:
+    """The exact form's A for couplings that may come from anywhere, for any number of right-hand sides.
+
+    Args:
+        couplings: Of the whole image, finite, 0 towards what is outside. A may have negative ones, which the
+            preconditioner takes for none.
+
+    Raises:
+        refine.SolverError: If nothing determines some pixel.
+    """
+
+    def __init__(self, couplings: Couplings) -> None:
+        tau = couplings.tau
+        self._operator = operator_of(tau, couplings.rows, "exact")
+        self._cycle = Cycle(self._operator, coarsen(tau, couplings.positive().rows, COLOR_SCALE))
+
+    def solve(self, b: Floats, tolerance: float) -> Iterated:
+        """Down to a residual of tolerance |b|; `Iterated.residual` tells whether it was reached. `b` is padded, and
+        overwritten. The coefficients are float32, which moves the solution by rounding too."""
+        size = float(np.linalg.norm(b))
+        return krylov(self._operator, b, tolerance * size, self._cycle, MAX_ITERATIONS)
 
 
 class Cycle:

@@ -11,7 +11,7 @@ which holds to rounding of the differences, however small tau is beside the coef
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from refine.solvers.halves import Halves, widened
 from refine.solvers.linear import Problem, SolverError
+from refine.system import Form
 from refine.weights import NEIGHBORS, Floats
 
 MARGIN = 2
@@ -52,6 +53,20 @@ class Couplings:
     term."""
     color: Singles
     """(H, W) beta (2 - phi_x - phi_y)."""
+
+    def rows(self, first: int, last: int) -> Couplings:
+        """Those of some rows of the image, of couplings of all."""
+        some = slice(first, last + 2 * MARGIN)
+        return Couplings(self.tau[some], self.weights[:, some], self.axial[:, some], self.color[some])
+
+    def positive(self) -> Couplings:
+        """These, 0 where they are negative."""
+        weights, axial, color = (np.maximum(part, 0) for part in (self.weights, self.axial, self.color))
+        return Couplings(self.tau, weights, axial, color)
+
+
+CouplingRows = Callable[[int, int], Couplings]
+"""First row and the one after the last, to the couplings of these rows."""
 
 
 @dataclass(frozen=True)
@@ -168,18 +183,28 @@ def _differences_until(sigma_r: float) -> int:
     return min(int(210 * sigma_r**2), 3 * 255**2) + 2
 
 
+def operator_of(tau: Singles, couplings: CouplingRows, form: Form) -> StencilOperator:
+    """A, for a padded tau; each row's couplings are asked for once, in order."""
+    exact = form == "exact"
+    planes = np.zeros((len(HALF) if exact else len(NEIGHBORS), *tau.shape), np.float32)
+    for first, last in bands(tau.shape[0] - 2 * MARGIN):
+        parts = couplings(first, last)
+        (_square if exact else _point)(parts.weights, parts.color, parts.axial, first, planes)
+    return StencilOperator(tau, planes)
+
+
 def system_of(problem: Problem, tau: Singles) -> System:
     """The system of a refinement: A is N + beta L' Phibar L, 25 points and symmetric, or the paper's N + beta Phibar
     L, 9 points."""
-    exact = problem.form == "exact"
-    operator = StencilOperator(
-        tau, np.zeros((len(HALF) if exact else len(NEIGHBORS), *tau.shape), np.float32)
-    )
     b = np.zeros(tau.shape)
-    for first, last in bands(problem.shape[0]):
+
+    def couplings(first: int, last: int) -> Couplings:
         parts = couplings_of(problem, tau, first, last)
-        (_square if exact else _point)(parts.weights, parts.color, parts.axial, first, operator.planes)
+        # Here, because they are not kept.
         _gather_right_hand_side(problem.disparity, problem.gradient, parts.tau, parts.axial, first, b)
+        return parts
+
+    operator = operator_of(tau, couplings, problem.form)
     size = float(np.linalg.norm(b))
     operator.remainder(b, pad(problem.start, np.float64), b)
     return System(operator, b, size)

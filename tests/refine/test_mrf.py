@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -322,7 +323,7 @@ def test_couplings_next_to_nothing_do_not_stop_the_multigrid(step):
 def test_eliminating_black_pixels_is_the_schur_complement(height, width):
     from refine.solvers.chessboard import eliminate_black
     from refine.solvers.linear import Problem as Checked
-    from refine.solvers.stencils import data_weight
+    from refine.solvers.stencils import couplings_of, data_weight
 
     problem = random_problem(height, width, seed=23)
     checked = Checked(*problem.inputs, DEFAULTS, "exact", problem.disparity)
@@ -340,7 +341,8 @@ def test_eliminating_black_pixels_is_the_schur_complement(height, width):
     left = np.setdiff1d(np.arange(height * width), gone)
     across = matrix[np.ix_(left, gone)]
     expected = matrix[np.ix_(left, left)] - across @ np.linalg.inv(matrix[np.ix_(gone, gone)]) @ across.T
-    graph, excess, _ = eliminate_black(checked, data_weight(checked), 0.5).graph()
+    tau = data_weight(checked)
+    graph, excess, _ = eliminate_black(tau, partial(couplings_of, checked, tau), 0.5).graph()
     found = np.zeros_like(expected)
     found[np.repeat(np.arange(excess.size), np.diff(graph.start)), graph.column] = -graph.value
     found += np.diag(excess - found.sum(axis=1))
@@ -361,12 +363,13 @@ def test_the_first_level_is_smoothed_alike_as_an_image_and_by_windows(style):
     from refine.solvers.chessboard import eliminate_black, grid_hierarchy
     from refine.solvers.hierarchy import build_hierarchy
     from refine.solvers.linear import Problem as Checked
-    from refine.solvers.stencils import data_weight
+    from refine.solvers.stencils import couplings_of, data_weight
     from refine.solvers.windows import by_windows
 
     problem = random_problem(45, 62, seed=5, style=style)
     checked = Checked(*problem.inputs, DEFAULTS, "exact", problem.disparity)
-    elimination = eliminate_black(checked, data_weight(checked), 0.5)
+    tau = data_weight(checked)
+    elimination = eliminate_black(tau, partial(couplings_of, checked, tau), 0.5)
     graph, excess, place = elimination.graph()
     smoother, position = by_windows(graph, excess)
     right_hand_side = np.random.default_rng(0).normal(size=elimination.tau.size).astype(np.float32)

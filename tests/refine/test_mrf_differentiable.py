@@ -15,6 +15,13 @@ FORMS = ["exact", "paper"]
 TIGHT = 1e-12
 
 
+@pytest.fixture(params=["kernels", "torch"])
+def solver(request, monkeypatch):
+    """The exact form as on CPUs, and as on other devices."""
+    if request.param == "torch":
+        monkeypatch.setattr("refine.differentiable._has_kernels", lambda *_: False)
+
+
 def batch(problems: list[Problem]) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
     disparity, confidence, gradient, image = (
         torch.from_numpy(np.stack([inputs[i] for inputs in (problem.inputs for problem in problems)]))
@@ -34,6 +41,7 @@ def test_image_weights_are_those_of_the_reference(style, size):
     np.testing.assert_allclose(weights.neighbors[0], neighbor_weights(problem.image), atol=1e-9)
 
 
+@pytest.mark.usefixtures("solver")
 @pytest.mark.parametrize("form", FORMS)
 def test_a_batch_is_solved_like_its_samples(form):
     problems = [random_problem(12, 9, seed, style) for seed, style in enumerate(["mixed", "smooth", "noise"])]
@@ -46,6 +54,7 @@ def test_a_batch_is_solved_like_its_samples(form):
         np.testing.assert_allclose(refined, expected, rtol=0, atol=1e-6)
 
 
+@pytest.mark.usefixtures("solver")
 @pytest.mark.parametrize("form", FORMS)
 def test_every_entry_of_every_jacobian_agrees_with_finite_differences(form):
     """What torch's gradcheck compares in its full mode and with its tolerances, every perturbed problem a sample of one
@@ -71,6 +80,7 @@ def test_every_entry_of_every_jacobian_agrees_with_finite_differences(form):
         torch.testing.assert_close(copy.grad.flatten(1), numeric, rtol=1e-4, atol=1e-4)
 
 
+@pytest.mark.usefixtures("solver")
 def test_gradcheck():
     """torch's own check, of random directions."""
     disparity, confidence, gradient, image = batch([random_problem(7, 6, seed=3, style="smooth")])
@@ -83,6 +93,7 @@ def test_gradcheck():
     assert torch.autograd.gradcheck(solved, inputs, eps=1e-5, atol=1e-4, rtol=1e-4, fast_mode=True)
 
 
+@pytest.mark.usefixtures("solver")
 def test_whole_frames_in_single_precision():
     """Couplings thousands of times tau, disparities of tens of pixels: the residual of float32 vectors stalls there."""
     problem = random_problem(90, 130, seed=6, style="smooth")
@@ -116,13 +127,33 @@ def test_descending_the_gradients_finds_a_confidence_that_helps():
     assert score.sigmoid()[wrong].mean() < 0.2 < 0.6 < score.sigmoid()[~wrong].mean()
 
 
+@pytest.mark.usefixtures("solver")
 def test_what_does_not_converge_says_so(monkeypatch):
-    import refine.differentiable
-
-    monkeypatch.setattr(refine.differentiable, "MAX_ITERATIONS", 2)
+    for limit in (
+        "differentiable.MAX_ITERATIONS",
+        "differentiable.MAX_ROUNDS",
+        "solvers.multigrid.MAX_ITERATIONS",
+    ):
+        monkeypatch.setattr(f"refine.{limit}", 2)
     disparity, confidence, gradient, image = batch([random_problem(20, 20, seed=4)])
     with pytest.raises(SolverError, match="short of"):
         refine_batch(disparity, confidence, gradient, image_weights(image, 2.55, torch.float64))
+
+
+@pytest.mark.usefixtures("solver")
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (6, 1), (3, 2)])
+def test_images_of_any_size_have_gradients(size):
+    disparity, confidence, gradient, image = batch(
+        [random_problem(*size, seed=8), random_problem(*size, seed=9)]
+    )
+    disparity.requires_grad_()
+    weights = image_weights(image, 2.55, torch.float64)
+    refine_batch(disparity, confidence, gradient, weights, tolerance=TIGHT).sum().backward()
+    assert disparity.grad is not None
+    # A 1 = tau, so the sum of a column of A^-1 T is 1 over the whole image: moving all by 1 moves the result by 1.
+    torch.testing.assert_close(
+        disparity.grad.flatten(1).sum(1), torch.full((2,), float(disparity[0].numel()), dtype=torch.float64)
+    )
 
 
 def test_bad_batches_are_named():
@@ -133,3 +164,11 @@ def test_bad_batches_are_named():
     disparity[0, 0, 0] = torch.nan
     with pytest.raises(ValueError, match="finite"):
         refine_batch(disparity, confidence, gradient, weights, MRFParameters())
+
+
+@pytest.mark.usefixtures("solver")
+def test_a_confidence_that_is_no_number_is_not_solved_for():
+    disparity, confidence, gradient, image = batch([random_problem(9, 8, seed=5)])
+    confidence[0, 2, 3] = torch.nan
+    with pytest.raises(SolverError, match="residual of nan"):
+        refine_batch(disparity, confidence, gradient, image_weights(image, 2.55, torch.float64))
