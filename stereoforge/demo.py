@@ -37,18 +37,20 @@ SHIPPED_METHODS = ("regressor", "gradnet", "ours", "ours_conf_gt")
 
 @dataclass(frozen=True)
 class DemoPlan:
-    """How much of everything; the defaults fill a quarter of an hour on two cores, installing included."""
+    """How much of everything; the defaults fill about a quarter of an hour on two cores, installing included."""
 
     world: FlyingThingsConfig = field(
         default_factory=lambda: FlyingThingsConfig(
             width=384, height=192, frames=4, background_objects=(60, 90)
         )
     )
-    scenes: dict[str, int] = field(default_factory=lambda: {"train": 30, "val": 4, "test": 4})
+    scenes: dict[str, int] = field(default_factory=lambda: {"train": 24, "val": 4, "test": 4})
     steps: dict[str, int] = field(
-        default_factory=lambda: {"regressor": 1300, "confnet": 200, "gradnet": 200, "regressor_f": 100}
+        default_factory=lambda: {"regressor": 1100, "confnet": 200, "gradnet": 200, "regressor_f": 100}
     )
     """Training steps of each network's `tiny` preset."""
+    samples: int = 2
+    """Paths a pixel."""
     gallery_scenes: int = 16
 
 
@@ -73,7 +75,7 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
     started = time.monotonic()
     data, weights = out / "data", out / "weights"
     with _stage(f"rendering {sum(plan.scenes.values()) * plan.world.frames} stereo pairs"):
-        render_all(Recipe(plan.world, plan.scenes), data)
+        render_all(Recipe(plan.world, plan.scenes, samples=plan.samples), data)
     gallery = out / "gallery.html"
     with _stage("making the gallery"):
         write_gallery(data, gallery, scenes=plan.gallery_scenes)

@@ -116,6 +116,14 @@ def test_color_and_grad_are_the_mrf_without_the_other_term():
     )
 
 
+def test_color_of_large_images_is_that_of_small_ones(monkeypatch):
+    frame = frame_of(90, 120, 3)
+    color = Color(beta=100.0, sigma_r=0.1)
+    factorised = color.run(frame).disparity
+    monkeypatch.setattr("refine.baselines.color._DIRECT_UP_TO_PIXELS", 0)
+    np.testing.assert_allclose(color.run(frame).disparity, factorised, atol=0.05)
+
+
 def test_colors_unsquared_form_is_eq_8_and_its_small_sigma_is_levins():
     frame = frame_of(6, 7, 1, "noise")
     level = np.zeros((6, 7, 2))
