@@ -67,7 +67,7 @@ def disparity_evidence(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor
         [
             matching_costs(left, right, disparity),
             limited_slopes(disparity),
-            *(map_ for window in RESIDUAL_WINDOWS_PX for map_ in _surroundings(disparity, window)),
+            *_surroundings(disparity),
             places.clamp(-LEFT_BORDER_CAP_PX, LEFT_BORDER_CAP_PX),
         ],
         dim=1,
@@ -109,7 +109,7 @@ def smooth_slopes(disparity: Tensor) -> Tensor:
     slopes = _differences(disparity)
     smooth = (slopes.abs() <= SMOOTH_WITHIN_PX).all(dim=1, keepdim=True).to(slopes.dtype)
     maps = torch.cat([slopes * smooth, smooth], dim=1)
-    means = [_box_mean(maps, window) for window in SLOPE_WINDOWS_PX]
+    means = box_means(maps, SLOPE_WINDOWS_PX)
     return torch.cat([mean[:, :2] / mean[:, 2:].clamp(min=1e-6) for mean in means], dim=1)
 
 
@@ -125,14 +125,41 @@ def _differences(disparity: Tensor) -> Tensor:
     return torch.cat([along_x, along_y], dim=1)
 
 
-def _surroundings(disparity: Tensor, window: int) -> tuple[Tensor, Tensor]:
-    """Signed distance to the window's mean, and the mean absolute one in the window."""
-    residual = (disparity - _box_mean(disparity, window)).clamp(-RESIDUAL_CEILING_PX, RESIDUAL_CEILING_PX)
-    return residual, _box_mean(residual.abs(), window)
+def _surroundings(disparity: Tensor) -> list[Tensor]:
+    """For each window the signed distance to its mean, and the mean absolute one in it."""
+    maps = []
+    for window, mean in zip(RESIDUAL_WINDOWS_PX, box_means(disparity, RESIDUAL_WINDOWS_PX), strict=True):
+        residual = (disparity - mean).clamp(-RESIDUAL_CEILING_PX, RESIDUAL_CEILING_PX)
+        maps += [residual, *box_means(residual.abs(), (window,))]
+    return maps
 
 
-def _box_mean(maps: Tensor, window: int) -> Tensor:
-    """Mean over a window, as much of it as lies inside; one direction after the other, for speed."""
+def box_means(maps: Tensor, windows: tuple[int, ...]) -> list[Tensor]:
+    """Means over square windows around each pixel, as much of them as lies inside.
+
+    By sums over all that is above and to the left (Crow 1984), in float64 so that differences of large sums keep their
+    digits: the cost does not grow with the windows.
+
+    Args:
+        maps: (B, C, H, W).
+        windows: Odd widths, px.
+
+    Returns:
+        For each window (B, C, H, W) in the maps' type.
+    """
+    sums = F.pad(maps.double().cumsum(-1).cumsum(-2), (1, 0, 1, 0))
+    ones = [torch.ones(size, dtype=torch.float64, device=maps.device) for size in maps.shape[-2:]]
+    means = []
+    for window in windows:
+        rows, columns = (_differences_across(F.pad(one.cumsum(0), (1, 0))[None], window)[0] for one in ones)
+        inside = _differences_across(_differences_across(sums, window).transpose(-1, -2), window)
+        means.append((inside.transpose(-1, -2) / (rows[:, None] * columns)).to(maps.dtype))
+    return means
+
+
+def _differences_across(sums: Tensor, window: int) -> Tensor:
+    """Along the last axis, from sums before each place, (..., N + 1): the windows' own sums, (..., N)."""
     reach = window // 2
-    rows = F.avg_pool2d(maps, (1, window), 1, (0, reach), count_include_pad=False)
-    return F.avg_pool2d(rows, (window, 1), 1, (reach, 0), count_include_pad=False)
+    last = sums[..., -1:].expand(*sums.shape[:-1], reach)
+    padded = torch.cat([F.pad(sums, (reach, 0)), last], dim=-1)
+    return padded[..., window:] - padded[..., :-window]
