@@ -72,6 +72,11 @@ class FrameScore:
         return {name: pool.score() for name, pool in self.pools.items()}
 
     @property
+    def has_truth(self) -> bool:
+        """Whether any of its pixels has ground truth."""
+        return bool(np.isfinite(self.initial_bad))
+
+    @property
     def aucs(self) -> dict[str, float]:
         """Areas under the curves, and the bounds: "random" order (on average the bad rate) and "optimal"."""
         measured = {name: curve.auc for name, curve in self.curves.items()}
@@ -108,6 +113,16 @@ class Evaluation:
     """Worst first."""
     judged: str
     """The method by which frames are called worst: "ours", or the first one where that did not run."""
+
+    @property
+    def refines(self) -> bool:
+        """Whether the judged method does anything to the initial disparity."""
+        return self.judged != "regressor"
+
+    @property
+    def measured_confidences(self) -> frozenset[str]:
+        """Names of the confidence measures that some frame has, without the bounds."""
+        return frozenset(name for frame in self.frames for name in frame.curves)
 
 
 def evaluate(

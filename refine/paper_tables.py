@@ -76,6 +76,8 @@ class _Layout:
     title: str
     methods: tuple[str, ...]
     columns: tuple[MeasureColumn, ...]
+    compares: bool = True
+    """Whether it says nothing about one method alone."""
 
 
 def _layouts(threshold: float) -> tuple[_Layout, ...]:
@@ -100,6 +102,7 @@ def _layouts(threshold: float) -> tuple[_Layout, ...]:
                 bad_all,
                 epe_all,
             ),
+            compares=False,
         ),
         _Layout(
             3,
@@ -123,24 +126,25 @@ def _layouts(threshold: float) -> tuple[_Layout, ...]:
                 MeasureColumn("d1_fg", "D1 foreground, %", 100),
                 MeasureColumn("d1_all", "D1 all, %", 100),
             ),
+            compares=False,
         ),
     )
 
 
 def paper_tables(each: EvaluatedSet, resamples: Bootstrap | None = None) -> tuple[PaperTable, ...]:
-    """The tables that have a row: 1-5, and 6 for sets in KITTI's style.
+    """The tables that say something: 1-5, and 6 for sets in KITTI's style. A comparison needs two methods.
 
     Args:
         each: The set.
         resamples: Its confidence intervals, made here if not given.
     """
     known = resamples or bootstrap(each.evaluation)
-    tables = (
+    return tuple(
         _table(each, known, layout)
         for layout in _layouts(each.evaluation.options.bad_threshold)
-        if layout.number != 6 or each.is_kitti
+        if (layout.number != 6 or each.is_kitti)
+        and sum(name in each.evaluation.scores for name in layout.methods) >= 1 + layout.compares
     )
-    return tuple(table for table in tables if any(row.method in each.evaluation.scores for row in table.rows))
 
 
 def _table(each: EvaluatedSet, known: Bootstrap, layout: _Layout) -> PaperTable:

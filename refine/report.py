@@ -95,7 +95,8 @@ class SetView:
     tables: tuple[PaperTable, ...]
     errors: Table
     missing: list[str]
-    confidences: Table
+    confidences: Table | None
+    """None, and no plots, where no confidence was predicted."""
     refined_confidences: Table | None
     frames: Table
     curve_plots: tuple[Markup, ...]
@@ -176,11 +177,11 @@ def _set_view(each: EvaluatedSet, index: int, seed: int) -> SetView:
         tables=paper_tables(each, intervals),
         errors=error_table(evaluation),
         missing=missing_notes(evaluation),
-        confidences=confidence_table(evaluation),
+        confidences=confidence_table(evaluation) if evaluation.measured_confidences else None,
         refined_confidences=refined_confidence_table(evaluation),
         frames=frame_table(evaluation),
         curve_plots=tuple(hoverable(figure) for _, figure in _curve_figures(evaluation)),
-        auc_plot=hoverable(auc_figure(evaluation.frames)) if len(evaluation.frames) > 1 else None,
+        auc_plot=hoverable(auc_figure(evaluation.frames)) if _has_auc_figure(evaluation) else None,
         panels=[panel_view(evaluation, panel) for panel in evaluation.first],
         worst=[
             panel_view(evaluation, panel, failure=True)
@@ -192,11 +193,18 @@ def _set_view(each: EvaluatedSet, index: int, seed: int) -> SetView:
     )
 
 
+def _has_auc_figure(evaluation: Evaluation) -> bool:
+    return len(evaluation.frames) > 1 and bool(evaluation.measured_confidences)
+
+
 def _curve_figures(evaluation: Evaluation) -> Iterator[tuple[str, Any]]:
-    first = evaluation.frames[0]
+    """The sparsification curves of the first frame with ground truth and of all; none without a confidence."""
+    if not evaluation.measured_confidences:
+        return
+    first = next((frame for frame in evaluation.frames if frame.has_truth), evaluation.frames[0])
     yield "fig4.svg", curve_figure(first.curves, first.initial_bad, f"First frame, {first.name}")
-    mean = mean_curves(evaluation)
-    yield "fig4-mean.svg", curve_figure(mean, None, f"Mean of {len(evaluation.frames)} frames")
+    count = sum(frame.has_truth for frame in evaluation.frames)
+    yield "fig4-mean.svg", curve_figure(mean_curves(evaluation), None, f"Mean of {count} frames")
 
 
 def _figure_files(view: SetView, compact: bool) -> Iterator[tuple[str, bytes]]:

@@ -27,6 +27,9 @@ from viewing import (
 )
 from viewing.plots import curves
 
+Map = NDArray[np.float32]
+"""(H, W)."""
+
 PANEL_LONGEST = 960
 """Pictures of larger frames are shrunk to this, so that a report stays a few megabytes."""
 LENS_SIZE = (64, 96)
@@ -53,7 +56,8 @@ class PanelView:
     summary: str
     pictures: tuple[tuple[Picture, str], ...]
     initial: Picture
-    refined: Picture
+    refined: Picture | None
+    """None where nothing was refined, the judged method being the regressor itself."""
     refined_label: str
     lens: Lens | None
 
@@ -64,50 +68,60 @@ def panel_view(evaluation: Evaluation, panel: Panel, failure: bool = False) -> P
     The close-up shows what refinement does at its best, or for a `failure` at its worst.
     """
     frame, refined = panel.frame, panel.disparities[evaluation.judged]
-    threshold = evaluation.options.bad_threshold
     label = evaluation.labels[evaluation.judged]
-    largest = float(np.nanmax(frame.truth)) if np.isfinite(frame.truth).any() else float(np.nanmax(refined))
-    maximum = max(largest, 1.0)
+    seen = frame.truth if np.isfinite(frame.truth).any() else refined
+    maximum = max(float(np.max(seen, initial=0.0, where=np.isfinite(seen))), 1.0)
     initial_picture, refined_picture = (
         shrunk(disparity_picture(values, maximum), PANEL_LONGEST) for values in (frame.disparity, refined)
     )
     score = evaluation.frames[panel.order]
+    before, after = score.initial_bad, score.methods[evaluation.judged].regions["all"].bad
+    threshold = evaluation.options.bad_threshold
     pictures = [
         (shrunk(frame.image, PANEL_LONGEST), "Left image"),
         (initial_picture, f"Initial disparity, 0 to {maximum:.0f} px"),
-        (
-            shrunk(error_picture(_error(frame.disparity, frame.truth), threshold), PANEL_LONGEST),
-            f"Initial error: red above {threshold:g} px ({score.initial_bad * 100:.1f} %)",
-        ),
-        (refined_picture, f"Refined disparity ({label})"),
-        (
-            shrunk(error_picture(_error(refined, frame.truth), threshold), PANEL_LONGEST),
-            f"Refined error: red above {threshold:g} px "
-            f"({score.methods[evaluation.judged].regions['all'].bad * 100:.1f} %)",
-        ),
+        *_error_picture("Initial", frame.disparity, frame.truth, before, threshold),
+        *_confidence_picture(frame.confidence),
     ]
-    if frame.confidence is not None:
-        confidence = shrunk(confidence_picture(frame.confidence), PANEL_LONGEST)
-        pictures.insert(3, (confidence, "Confidence: yellow sure, blue not"))
+    if evaluation.refines:
+        pictures += [
+            (refined_picture, f"Refined disparity ({label})"),
+            *_error_picture("Refined", refined, frame.truth, after, threshold),
+        ]
     return PanelView(
         name=frame.name,
         summary=_summary(evaluation, score),
         pictures=tuple(pictures),
         initial=initial_picture,
-        refined=refined_picture,
+        refined=refined_picture if evaluation.refines else None,
         refined_label=label,
-        lens=_lens(panel, refined, failure),
+        lens=_lens(panel, refined, failure) if evaluation.refines else None,
     )
+
+
+def _error_picture(
+    which: str, disparity: Map, truth: Map, bad: float, threshold: float
+) -> list[tuple[Picture, str]]:
+    """A disparity's error with its caption; nothing where the frame has no ground truth."""
+    if not np.isfinite(truth).any():
+        return []
+    picture = shrunk(error_picture(_error(disparity, truth), threshold), PANEL_LONGEST)
+    return [(picture, f"{which} error: red above {threshold:g} px ({bad * 100:.1f} %)")]
+
+
+def _confidence_picture(confidence: Map | None) -> list[tuple[Picture, str]]:
+    if confidence is None:
+        return []
+    return [(shrunk(confidence_picture(confidence), PANEL_LONGEST), "Confidence: yellow sure, blue not")]
 
 
 def panel_picture(view: PanelView) -> Picture:
     """A panel's pictures in one, three a row, as the paper's Fig. 6 has them: image, initial disparity, initial
-    error; confidence, refined disparity, refined error."""
+    error; confidence, refined disparity, refined error. Those that the frame has not are left out."""
     pictures = [picture for picture, _ in view.pictures]
-    if len(pictures) % 3:  # without a confidence
-        pictures.insert(3, np.full_like(pictures[0], 255))
-    rows = [side_by_side(pictures[start : start + 3]) for start in range(0, len(pictures), 3)]
-    return stacked(rows)
+    blank = np.full_like(pictures[0], 255)
+    pictures += [blank] * (-len(pictures) % 3)
+    return stacked([side_by_side(pictures[start : start + 3]) for start in range(0, len(pictures), 3)])
 
 
 def lens_picture(lens: Lens) -> Picture:
@@ -177,9 +191,11 @@ def _error(disparity: NDArray[np.float32], truth: NDArray[np.float32]) -> NDArra
 
 
 def _summary(evaluation: Evaluation, score: FrameScore) -> str:
-    parts = []
-    for name, method in score.methods.items():
-        region = method.regions["all"]
-        if region.pixels:
-            parts.append(f"{evaluation.labels[name]}: {region.bad * 100:.1f} % bad, EPE {region.epe:.2f} px")
-    return "; ".join(parts)
+    """The errors before and after."""
+    if not score.has_truth:
+        return "No ground truth, so no errors"
+    names = [name for name in dict.fromkeys(("regressor", evaluation.judged)) if name in score.methods]
+    regions = {evaluation.labels[name]: score.methods[name].regions["all"] for name in names}
+    return "; ".join(
+        f"{label}: {region.bad * 100:.1f} % bad, EPE {region.epe:.2f} px" for label, region in regions.items()
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from refine.bootstrap import REFERENCE, Bootstrap
 from refine.evaluation import Evaluation, FrameScore
@@ -30,6 +30,8 @@ class Cell:
     text: str
     value: str
     best: bool = False
+    note: str = ""
+    """Smaller, under the text."""
 
 
 @dataclass(frozen=True)
@@ -102,11 +104,11 @@ def overview_table(sets: Sequence[EvaluatedSet], intervals: Sequence[Bootstrap])
             if beside is not None:
                 printed = PAPER[beside]
                 paper = printed["ours"].value(measure) / printed[REFERENCE].value(measure)
-            arrow = f"{before[measure] * scale:.{digits}f} → {after[measure] * scale:.{digits}f}"
-            range_ = "" if math.isnan(interval.low) else f" ({interval.low:.2f}–{interval.high:.2f})"
+            start, end = (number(each[measure], digits, scale) for each in (before, after))
+            range_ = "" if math.isnan(interval.low) else f"{interval.low:.2f}–{interval.high:.2f}"
             cells += [
-                Cell(arrow, repr(after[measure])),
-                Cell(f"{ratio:.2f}{range_}", repr(ratio)),
+                replace(end, text=f"{start.text} → {end.text}"),
+                replace(number(ratio), note=range_),
                 number(paper),
             ]
         rows.append((each.name, tuple(cells)))
@@ -217,33 +219,34 @@ def _share_beaten(evaluation: Evaluation, name: str) -> float:
 
 
 def frame_table(evaluation: Evaluation) -> Table:
-    """One row a frame: the initial and the judged method's errors, and ConfNet's area under the curve."""
+    """One row a frame: the initial and the judged method's errors, and ConfNet's area under the curve if there is a
+    ConfNet."""
     judged = evaluation.labels[evaluation.judged].lower()
-    headings = (
-        "Frame",
-        "bad before, %",
-        f"bad {judged}, %",
-        "EPE before",
-        f"EPE {judged}",
-        "AUC",
-        "optimal AUC",
+    after = (f"bad {judged}, %", f"EPE {judged}") if evaluation.refines else ()
+    areas = ("AUC", "optimal AUC") if any("confnet" in frame.curves for frame in evaluation.frames) else ()
+    rows = tuple(
+        (
+            frame.name,
+            _initial_cells(frame)
+            + (_judged_cells(frame.methods[evaluation.judged]) if after else ())
+            + (_area_cells(frame) if areas else ()),
+        )
+        for frame in evaluation.frames
     )
-    return Table(
-        headings, tuple((frame.name, _frame_cells(evaluation, frame)) for frame in evaluation.frames)
-    )
+    return Table(("Frame", "bad before, %", "EPE before", *after, *areas), rows)
 
 
-def _frame_cells(evaluation: Evaluation, frame: FrameScore) -> tuple[Cell, ...]:
-    nothing = math.nan
-    before, after = frame.methods.get("regressor"), frame.methods[evaluation.judged]
-    return (
-        percent(frame.initial_bad),
-        percent(after.regions["all"].bad),
-        number(before.regions["all"].epe if before else nothing, 3),
-        number(after.regions["all"].epe, 3),
-        number(frame.aucs.get("confnet", nothing), 4),
-        number(frame.optimal_auc, 4),
-    )
+def _initial_cells(frame: FrameScore) -> tuple[Cell, ...]:
+    initial = frame.methods.get("regressor")
+    return percent(frame.initial_bad), number(initial.regions["all"].epe if initial else math.nan, 3)
+
+
+def _judged_cells(score: MethodScore) -> tuple[Cell, ...]:
+    return percent(score.regions["all"].bad), number(score.regions["all"].epe, 3)
+
+
+def _area_cells(frame: FrameScore) -> tuple[Cell, ...]:
+    return number(frame.aucs.get("confnet", math.nan), 4), number(frame.optimal_auc, 4)
 
 
 def _error_values(score: MethodScore) -> tuple[float, ...]:

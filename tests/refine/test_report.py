@@ -8,6 +8,7 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import imageio.v3 as imageio
 import numpy as np
 import pytest
 
@@ -178,6 +179,45 @@ def test_a_report_of_one_frame_without_networks(tmp_path):
     assert parser.open == []
     assert "Not run: Ours needs confidence and gradient, which the frames lack." in parser.text
     assert "Regressor gives no disparity at 25.0 % of the pixels" in parser.text
+
+
+def bare(seed, **changes):
+    """A frame of which only the disparity was predicted."""
+    return replace(toy_frame(seed), confidence=None, gradient=None, **changes)
+
+
+def test_nothing_about_confidence_without_one_and_no_comparison_of_one_method(tmp_path):
+    evaluation = evaluate([bare(seed) for seed in range(3)], MAIN_ROWS)
+    files = write_report([EvaluatedSet("toys", evaluation, "flying_things")], tmp_path)
+    text = files.html.read_text()
+    assert "<svg" not in text
+    for word in ("ConfNet", "AUC", "parsification", "Table 1", "fter refinement", "Refined"):
+        assert word not in text
+    assert "Table 2" in text
+    assert not list(files.figures.glob("*/*.svg"))
+
+
+def test_a_frame_without_ground_truth_has_no_error_pictures(tmp_path):
+    nothing = np.full((48, 80), np.nan, np.float32)
+    frames = [replace(toy_frame(0), truth=nothing), toy_frame(1)]
+    text = write_report([EvaluatedSet("toys", evaluate(frames, MAIN_ROWS))], tmp_path).html.read_text()
+    first, second = text.split('<section class="panel">')[1:]
+    assert "No ground truth, so no errors." in first
+    assert "rror: red" not in first
+    assert second.count("rror: red above 1 px (") == 2 * 2  # caption and alternative text
+    assert "First frame, TEST/A/0001/0006" in text
+    assert "nan" not in re.sub(r"data:image/[a-z]+;base64,[A-Za-z0-9+/=]+", "", text)
+    assert imageio.imread(tmp_path / "figures" / "toys" / "fig6-1.png").ndim == 3
+
+
+def test_the_overview_has_intervals_under_its_ratios(tmp_path, evaluation):
+    sets = [EvaluatedSet(name, evaluation, "flying_things") for name in ("one", "two")]
+    text = write_report(sets, tmp_path).html.read_text()
+    ratio = re.search(
+        r'id="table-overview".*?<td data-value="[^"]*">(\d\.\d\d)<small>(.*?)</small>', text, re.DOTALL
+    )
+    low, high = map(float, ratio[2].split("–"))
+    assert low <= float(ratio[1]) <= high
 
 
 def brute_force_window(score: np.ndarray, size: tuple[int, int]) -> tuple[slice, slice]:

@@ -51,6 +51,14 @@ window.onload = () => {
   facts.left = view.getComputedStyle(note).display;
   const stage = page.querySelector(".compare-stage"), slider = stage.querySelector("input");
   slider.value = 20; slider.dispatchEvent(new view.Event("input"));
+  const frame = document.querySelector("iframe"), scroller = page.querySelector(".table-scroll");
+  facts.stuck = [400, 700].map(width => {
+    frame.width = width;
+    page.querySelector("table").style.width = "1200px";
+    scroller.scrollLeft = 150;
+    return page.querySelector("tbody th").getBoundingClientRect().left - scroller.getBoundingClientRect().left;
+  });
+  facts.scrolled = scroller.scrollLeft;
   facts.share = stage.style.getPropertyValue("--share");
   document.body.textContent = "FACTS" + JSON.stringify(facts) + "END";
 };
@@ -114,6 +122,11 @@ def test_a_pointer_over_a_plot_reads_every_curve_there(facts: dict[str, Any]) ->
 
 def test_a_long_name_stays_in_its_column(facts: dict[str, Any]) -> None:
     assert facts["overflowing"] == 0
+
+
+def test_a_wide_table_scrolls_in_its_own_box_and_keeps_its_first_column(facts: dict[str, Any]) -> None:
+    assert facts["scrolled"] == 150
+    assert facts["stuck"] == [0, 0]
 
 
 def test_the_handle_shows_more_of_one_picture(facts: dict[str, Any]) -> None:

@@ -32,6 +32,10 @@ for (const table of document.querySelectorAll("table.sortable")) {
     });
   }
 }
+// A table that has been scrolled sideways shows where its first column, which stays, ends.
+for (const box of document.querySelectorAll(".table-scroll")) {
+  box.addEventListener("scroll", () => box.classList.toggle("scrolled", box.scrollLeft > 0), { passive: true });
+}
 // Before/after: the range input lies invisibly over the pictures, so mouse, touch and arrow keys all work.
 for (const stage of document.querySelectorAll(".compare-stage")) {
   const input = stage.querySelector("input");
