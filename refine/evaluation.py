@@ -106,7 +106,7 @@ class Evaluation:
     scores: dict[str, MethodScore]
     """Pooled over all pixels of all frames on which the method ran."""
     skipped: dict[str, str]
-    """Methods that could not run, and the inputs they lacked."""
+    """Methods that could not run, and in a sentence without its full stop what they lacked."""
     frames: tuple[FrameScore, ...]
     first: tuple[Panel, ...]
     worst: tuple[Panel, ...]
@@ -174,9 +174,8 @@ class _Run:
             self._choose_methods(frame)
         pools, disparities = {}, {}
         for method in self.methods:
-            if method.missing(frame):
-                lacking = " and no ".join(method.missing(frame))
-                raise ValueError(f"frame {frame.name} has no {lacking}; the first frame has")
+            if lacking := method.lacks(frame):
+                raise ValueError(f"frame {frame.name} comes without {lacking}, unlike the first frame")
             began = time.perf_counter()
             output = method.run(frame)
             pool = self._empty_pool()
@@ -208,7 +207,7 @@ class _Run:
 
     def _choose_methods(self, frame: EvaluationFrame) -> None:
         self.skipped = {
-            method.name: f"{method.label} needs {' and '.join(method.missing(frame))}, which the frames lack"
+            method.name: f"{method.label} needs {method.lacks(frame)}, which the frames come without"
             for method in self.methods
             if method.missing(frame)
         }

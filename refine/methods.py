@@ -20,6 +20,15 @@ from numpy.typing import NDArray
 PAPER_FIRST = ("regressor", "regressor_f", "gradnet", "sgbm", "wmf", "color", "tgv", "fbs", "grad")
 PAPER_LAST = ("ours", "ours_conf_gt")
 
+INPUTS_IN_WORDS = {
+    "confidence": "a confidence",
+    "gradient": "predicted gradients",
+    "right": "the right view",
+    "fine_tuned": "the disparity of a regressor fine-tuned on gradients",
+    "objects": "an object map",
+}
+"""What a reader calls the fields of `EvaluationFrame` that methods may need."""
+
 
 @dataclass(frozen=True)
 class EvaluationFrame:
@@ -117,6 +126,10 @@ class Method(ABC):
     def missing(self, frame: EvaluationFrame) -> tuple[str, ...]:
         """Which of the fields it needs this frame does not have."""
         return tuple(sorted(name for name in self.needs if getattr(frame, name) is None))
+
+    def lacks(self, frame: EvaluationFrame) -> str:
+        """The same in a reader's words, such as "a confidence and predicted gradients"; empty if it has them all."""
+        return " and ".join(INPUTS_IN_WORDS[name] for name in self.missing(frame))
 
 
 @cache

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Protocol
@@ -17,6 +18,7 @@ from matching import SGBMParameters, fill_background, left_right_consistency, ma
 from refine.evaluation import EvaluationFrame
 from refine.forest import Forest, load_forest
 from refine.handmade import consistency_confidence, local_slopes
+from refine.methods import Method
 from refine.settings import Settings, read_settings
 from stereoforge.errors import CommandError
 from training.predict import FreePredictor, Prediction, StereoPredictor
@@ -154,6 +156,46 @@ def fallback_notes(run: Path) -> list[str]:
     return notes
 
 
+def train_command(network: str, run: Path) -> str:
+    """What to type to have a network in a run folder."""
+    return f"stereoforge train {network} --data DATA --out {run}"
+
+
+def untrained(methods: Sequence[Method], run: Path, predictor: PredictorName) -> dict[str, list[str]]:
+    """Methods by name that a run folder does not serve, and the networks it lacks for each.
+
+    Judging semi-global matching needs none: what no network says is made by hand. It has no fine-tuned counterpart.
+    """
+    networks = {"fine_tuned": "regressor_f"}
+    if predictor == "networks":
+        networks |= {"confidence": "confnet", "gradient": "gradnet"}
+    lacking = {
+        method.name: [
+            network
+            for needed, network in networks.items()
+            if needed in method.needs and (predictor == "sgbm" or not has_weights(run, network))
+        ]
+        for method in methods
+    }
+    return {name: missing for name, missing in lacking.items() if missing}
+
+
+def untrained_notes(lacking: Mapping[str, Sequence[str]], run: Path, predictor: PredictorName) -> list[str]:
+    """A sentence for each network that methods have to do without (`untrained`), and what makes one."""
+    needed_by: dict[str, list[str]] = {}
+    for method, networks in lacking.items():
+        for network in networks:
+            needed_by.setdefault(network, []).append(method)
+    notes = []
+    for network, methods in needed_by.items():
+        if predictor == "networks":
+            reason, remedy = f"{run} has no {network}", f": {train_command(network, run)} makes one"
+        else:
+            reason, remedy = "semi-global matching has no fine-tuned counterpart", ""
+        notes.append(f"{reason}, so {', '.join(methods)} cannot run{remedy}")
+    return notes
+
+
 def predict_pair(
     left: Image,
     right: Image,
@@ -183,7 +225,9 @@ def predict_pair(
     answer = StereoPredictor(run, device).predict(left, right)
     for name, found in (("confnet", answer.confidence), ("gradnet", answer.gradient)):
         if found is None:
-            raise CommandError(f"{run}: has no {name}, which refining needs; train one into it")
+            raise CommandError(
+                f"{run}: has no {name}, which refining needs: {train_command(name, run)} makes one"
+            )
     return answer, []
 
 

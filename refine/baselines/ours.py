@@ -51,7 +51,7 @@ class Ours(Method):
         """What `solve` and `sample` take of a frame."""
         if frame.confidence is None or frame.gradient is None:
             raise ValueError(
-                f"{self.label} needs {', '.join(self.missing(frame))}; frame {frame.name} has none"
+                f"{self.label} needs {self.lacks(frame)}, which frame {frame.name} comes without"
             )
         return frame.disparity, frame.confidence, frame.gradient, frame.image
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from stereoforge.errors import UsageError
+from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console
 from stereoforge.shipped import SHIPPED_WEIGHTS
 from stereoforge.values import parse_methods, shown
@@ -69,7 +69,13 @@ class Evaluate:
             open_test_data,
             report_evaluation,
         )
-        from stereoforge.prediction import fallback_notes, open_predictors, open_settings
+        from stereoforge.prediction import (
+            fallback_notes,
+            open_predictors,
+            open_settings,
+            untrained,
+            untrained_notes,
+        )
         from stereoforge.submission import find_submission_frames, write_submission
 
         data = open_test_data(self.data, self.split)
@@ -77,6 +83,10 @@ class Evaluate:
         settings = open_settings(self.parameters, self.weights, self.predictor)
         predictors = open_predictors(self.weights, self.device, self.predictor)
         rows = settings.rows(methods)
+        lacking = untrained(rows, self.weights, self.predictor)
+        notes = untrained_notes(lacking, self.weights, self.predictor)
+        if len(lacking) == len(rows):
+            raise CommandError("; ".join(notes))
         sets = [
             evaluate_set(
                 each,
@@ -91,10 +101,11 @@ class Evaluate:
             "Command": shlex.join(["stereoforge", *sys.argv[1:]]),
         }
         files = report_evaluation(sets, self.weights, self.out, facts=facts, bootstrap_seed=self.seed)
-        for note in fallback_notes(self.weights) if self.predictor == "sgbm" else []:
+        if self.predictor == "sgbm":
+            notes += fallback_notes(self.weights)
+        skipped = sets[0].evaluation.skipped
+        for note in (*notes, *(reason for name, reason in skipped.items() if name not in lacking)):
             console.print(note, markup=False)
-        for name, reason in sets[0].evaluation.skipped.items():
-            console.print(f"{name} did not run: {reason}", markup=False)
         frames = ", ".join(f"{len(each.evaluation.frames)} of {each.name}" for each in sets)
         console.print(f"{files.html}: frames evaluated: {frames}", markup=False)
         if self.submission:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from stereoforge.errors import UsageError
+from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console
 from stereoforge.values import parse_methods, shown
 
@@ -48,11 +48,17 @@ class Tune:
         from rich.table import Table
 
         from datagen.source import open_source
-        from stereoforge.prediction import open_predictors, parameters_file
+        from refine.methods import default_methods
+        from stereoforge.prediction import open_predictors, parameters_file, untrained, untrained_notes
         from stereoforge.tuning import Tuning, describe, shown_values, validation_frames
 
         sources = [open_source(text) for text in self.data]
         predictors = open_predictors(self.weights, self.device, self.predictor)
+        asked = [method for method in default_methods(methods) if method.search]
+        lacking = untrained(asked, self.weights, self.predictor)
+        notes = untrained_notes(lacking, self.weights, self.predictor)
+        if len(lacking) == len(asked):
+            raise CommandError("; ".join(notes) or f"{', '.join(methods)}: there is nothing to tune")
         frames = validation_frames(sources, predictors, self.frames)
         out = parameters_file(self.weights, self.predictor) if self.out is None else self.out
         tuned = Tuning(frames, out, describe(frames, self.data, self.objective), self.objective).run(methods)
@@ -64,4 +70,6 @@ class Tune:
                 values = (f"{value:.3f}" for value in (result.default_objective, result.objective))
                 table.add_row(name, *values, shown_values(result.method))
         console.print(table)
+        for note in notes:
+            console.print(note, markup=False)
         console.print(f"{out}: {len(tuned)} methods, validated on {len(frames)} frames", markup=False)

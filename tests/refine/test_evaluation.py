@@ -122,14 +122,14 @@ def test_methods_without_their_inputs_are_skipped_and_named():
     frame = replace(toy_frame(0, 12, 16), confidence=None)
     evaluation = evaluate([frame], MAIN_ROWS)
     assert list(evaluation.scores) == ["regressor", "gradnet", "ours_conf_gt"]
-    assert evaluation.skipped == {"ours": "Ours needs confidence, which the frames lack"}
+    assert evaluation.skipped == {"ours": "Ours needs a confidence, which the frames come without"}
     assert evaluation.judged == "regressor"
     assert evaluation.frames[0].curves == {}
 
 
 def test_frames_must_agree_on_what_they_have():
     whole = toy_frame(0, 12, 16)
-    with pytest.raises(ValueError, match=r"frame TEST/A/0001/0006 has no gradient; the first frame has"):
+    with pytest.raises(ValueError, match="frame TEST/A/0001/0006 comes without predicted gradients"):
         evaluate([whole, replace(toy_frame(1, 12, 16), gradient=None)])
 
 
@@ -137,7 +137,7 @@ def test_nothing_to_do_is_an_error():
     with pytest.raises(ValueError, match="no frame"):
         evaluate([])
     bare = replace(toy_frame(0, 12, 16), gradient=None)
-    with pytest.raises(ValueError, match="no method can run: GradNet needs gradient"):
+    with pytest.raises(ValueError, match="no method can run: GradNet needs predicted gradients"):
         evaluate([bare], [GradNet()])
     with pytest.raises(ValueError, match="evaluated once"):
         evaluate([bare], [Regressor(), Regressor()])

@@ -177,7 +177,10 @@ def test_a_report_of_one_frame_without_networks(tmp_path):
     parser = Page()
     parser.feed(files.html.read_text())
     assert parser.open == []
-    assert "Not run: Ours needs confidence and gradient, which the frames lack." in parser.text
+    assert (
+        "Not run: Ours needs a confidence and predicted gradients, which the frames come without."
+        in parser.text
+    )
     assert "Regressor gives no disparity at 25.0 % of the pixels" in parser.text
 
 
