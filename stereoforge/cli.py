@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import tyro
 
-from stereoforge.commands import COMMANDS
+from stereoforge.commands import COMMANDS, after_interruption
 from stereoforge.errors import CommandError, UsageError
 
 DEBUG_FLAG = "--debug"
@@ -32,14 +33,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
     debug = DEBUG_FLAG in words
     command = _parse([word for word in words if word != DEBUG_FLAG])
     try:
-        command.run()
+        with _terminated_like_interrupted():
+            command.run()
     except KeyboardInterrupt:
-        sys.exit(_say("interrupted; the same command run again continues where it can", 130))
+        sys.exit(_say(f"interrupted; {after_interruption(command)}", 130))
     except Exception as error:
         if debug:
             raise
         sys.exit(_say(*_explain(error)))
     sys.exit(0)
+
+
+@contextlib.contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    """Let SIGTERM, a scheduler's way to say stop, end a command as cleanly as Ctrl-C."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _parse(words: Sequence[str]) -> Any:

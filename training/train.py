@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import logging
+import signal
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -161,7 +162,7 @@ def train(
         fingerprints=tuple(source.fingerprint for source in sources),
         revision=code_revision(),
     )
-    with _quiet_lightning(), torch.random.fork_rng():
+    with _quiet_lightning(), _interruptible(), torch.random.fork_rng():
         torch.manual_seed(seed)
         lightning_task, regressor_sha256 = _build_task(preset, module, out, init, refinement, steps, seed)
         if hardware["accelerator"] == "cpu" or precision != "32" or not torch.cuda.is_available():
@@ -348,7 +349,7 @@ def _check_settings(path: Path, settings: dict[str, Any]) -> None:
 @contextmanager
 def _quiet_lightning() -> Iterator[None]:
     """Keep Lightning's hardware notes and advice off the terminal."""
-    logger = logging.getLogger("pytorch_lightning.utilities.rank_zero")
+    logger = logging.getLogger("pytorch_lightning")
     level = logger.level
     logger.setLevel(logging.WARNING)
     try:
@@ -357,3 +358,17 @@ def _quiet_lightning() -> Iterator[None]:
             yield
     finally:
         logger.setLevel(level)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let an interruption out as the KeyboardInterrupt it was: Lightning makes it SystemExit, and turns a deaf ear to
+    further ones."""
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        yield
+    except SystemExit as end:
+        if not isinstance(end.__context__, KeyboardInterrupt):
+            raise
+        signal.signal(signal.SIGINT, before)
+        raise end.__context__ from None

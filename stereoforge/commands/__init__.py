@@ -1,7 +1,7 @@
 """One module a command: a frozen dataclass whose fields are its flags and whose `run` does the work."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from stereoforge.commands.demo import Demo
 from stereoforge.commands.evaluate import Evaluate
@@ -37,3 +37,8 @@ COMMANDS: dict[str, Callable[..., Command]] = {
     "demo": Demo,
 }
 """Every command by its name, in the order of use."""
+
+
+def after_interruption(command: Any) -> str:
+    """What running a command again does that was interrupted: its own `interrupted`, where it has one."""
+    return str(getattr(command, "interrupted", "the same command run again starts anew"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from stereoforge.progress import console
 from stereoforge.values import shown
@@ -16,6 +16,8 @@ class Demo:
 
     Run it again to continue where it stopped.
     """
+
+    interrupted: ClassVar[str] = "the same command run again continues where it stopped"
 
     out: Annotated[Path, shown("DIR")] = Path("demo")
     """Folder for everything."""

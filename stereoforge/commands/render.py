@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import shutil
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from rich.markup import escape
 from rich.table import Table
@@ -39,6 +36,8 @@ class Render:
     With --recipe, the file says what to render and the flags given besides it change it. A scene that crashes,
     hangs or exceeds its memory twice goes to DIR/quarantine and the others go on.
     """
+
+    interrupted: ClassVar[str] = "the same command run again continues where it stopped"
 
     out: Annotated[str, shown("DIR")]
     """Folder of the data set, or a URL such as s3://bucket/folder."""
@@ -112,8 +111,7 @@ class Render:
         if self.dry_run:
             self._estimate(recipe)
             return
-        with _terminated_like_interrupted():
-            summary = self._render(recipe, executor)
+        summary = self._render(recipe, executor)
         console.print(
             f"{self.out}: {summary.rendered} scenes rendered, {summary.already_there} were there already"
         )
@@ -254,13 +252,3 @@ def _failure_table(failures: tuple[QuarantinedScene, ...]) -> Table:
     for entry in failures:
         table.add_row(entry.name, escape(entry.reason), str(entry.attempts))
     return table
-
-
-@contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
-    """Let SIGTERM, a scheduler's way to say stop, end the run as cleanly as Ctrl-C."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

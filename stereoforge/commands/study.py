@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from scenes import FAMILIES
 from stereoforge.errors import UsageError
@@ -23,6 +23,8 @@ class Study:
     extend it: every step has a folder named by all that decides its result, and is done once. OUT/results holds the
     report, the tables, the gap and summary.json.
     """
+
+    interrupted: ClassVar[str] = "the same command run again continues where it stopped"
 
     out: Annotated[Path, shown("DIR")]
     """Folder for everything."""

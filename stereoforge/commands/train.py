@@ -74,6 +74,13 @@ class Train:
     precision: Literal["32", "bf16", "16"] = "32"
     """Bits of the convolutions; 16 and bf16 are mixed precision."""
 
+    @property
+    def interrupted(self) -> str:
+        """How to go on after an interruption."""
+        if self.task == "rdf":
+            return "nothing was written; run the same command again"
+        return "the same command with --resume continues from the last checkpoint"
+
     def run(self) -> None:
         for name, value, least in (
             ("steps", self.steps, 1),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import tyro
 
@@ -20,6 +20,8 @@ class Tune:
     A coordinate search: each parameter in turn moves along a short list of values while the errors, relative to the
     initial disparity's, fall. Run it again to continue where it stopped.
     """
+
+    interrupted: ClassVar[str] = "the same command run again continues where it stopped"
 
     data: Annotated[tyro.conf.Positional[tuple[str, ...]], shown("DATA")]
     """Data sets, as for `evaluate`; their validation splits are used. One without splits needs #0-99 behind."""

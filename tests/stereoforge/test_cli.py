@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -265,6 +267,41 @@ def test_damaged_files_are_named_wherever_they_are_read(
         sentence = refused(1, "evaluate", root, "--weights", out / "weights", "--out", tmp_path / "report")
         assert victim in sentence
         assert not (tmp_path / "report").exists()
+
+
+INTERRUPTED = [
+    (
+        ("train", "regressor", "--data", "set", "--out", "run"),
+        "training.train.train",
+        "with --resume continues",
+    ),
+    (
+        ("train", "rdf", "--data", "set", "--out", "run"),
+        "stereoforge.forest.train_forest",
+        "nothing was written",
+    ),
+    (("demo",), "stereoforge.demo.run_demo", "continues where it stopped"),
+    (("study", "--plan", "p", "--out", "s"), "stereoforge.study.read_plan", "continues where it stopped"),
+    (("evaluate", "set", "--out", "r"), "stereoforge.evaluation.open_test_data", "starts anew"),
+    (("tune", "set", "--weights", "run"), "datagen.source.open_source", "continues where it stopped"),
+]
+
+
+@pytest.mark.parametrize(("words", "busy_in", "how"), INTERRUPTED)
+def test_sigterm_ends_every_command_with_how_to_go_on(
+    words: tuple[str, ...],
+    busy_in: str,
+    how: str,
+    refused: Callable[..., str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    module, _, name = busy_in.rpartition(".")
+    monkeypatch.setattr(import_module(module), name, lambda *_, **__: signal.raise_signal(signal.SIGTERM))
+    sentence = refused(130, *words)
+    assert sentence.startswith("stereoforge: interrupted; ")
+    assert how in sentence
+    assert signal.getsignal(signal.SIGTERM) == before
 
 
 def test_debug_shows_the_traceback(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import shutil
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -96,7 +97,7 @@ def test_resumed_equals_uninterrupted(task: str, data: Path, run: Path, tmp_path
     train(task, [(data, 1.0)], whole, preset, steps=11, seed=3, progress=False)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(StereoTask, "on_train_batch_end", _stop_after(6))
+        patch.setattr(StereoTask, "on_train_batch_end", _stop_after(6, _PowerCut))
         with pytest.raises(_PowerCut):
             train(task, [(data, 1.0)], broken, preset, steps=11, seed=3, progress=False)
     train(task, [(data, 1.0)], broken, preset, steps=11, seed=3, resume=True, progress=False)
@@ -118,12 +119,23 @@ class _PowerCut(Exception):  # noqa: N818
     pass
 
 
-def _stop_after(steps: int) -> object:
+def _stop_after(steps: int, why: type[BaseException]) -> object:
     def on_train_batch_end(self: pl.LightningModule, *_: object) -> None:
         if self.global_step == steps:
-            raise _PowerCut
+            raise why
 
     return on_train_batch_end
+
+
+def test_an_interruption_comes_out_as_one_and_the_next_is_heard_too(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(StereoTask, "on_train_batch_end", _stop_after(6, KeyboardInterrupt))
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt):
+        train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=11, progress=False)
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+    assert read_summary(tmp_path, "regressor").best_step == 4  # whole: the last validation's
 
 
 def test_resuming_a_finished_run_changes_nothing(data: Path, run: Path, tmp_path: Path) -> None:
