@@ -30,6 +30,7 @@ from training.augmentation import (
     cut,
 )
 from training.errors import TrainingError
+from training.networks.dispnet import STRIDE
 from training.presets import Preset
 from training.provenance import data_fingerprint
 
@@ -145,7 +146,8 @@ class CropDataset(Dataset[Batch]):
         size = (self._preset.crop_height, self._preset.crop_width)
         pair = self._cache[source, frame]
         if pair.left.shape[0] < size[0] or pair.left.shape[1] < size[1]:
-            raise TrainingError(too_small(self._cache.name(source, frame), pair.left.shape[:2], size))
+            found = pair.left.shape[:2]
+            raise TrainingError(too_small(self._cache.name(source, frame), found, size, found))
         rng = np.random.default_rng([self._seed, 2, draw])
         return as_tensors(
             augment(rng, pair, size, self._preset.augmentation, step=draw // self._draws_per_step)
@@ -250,17 +252,31 @@ def open_sources(
             raise TrainingError(f"{location}: the weight of a data set must be positive, got {weight}")
         opened = open_source(location)
         frames = opened.frames("train")
-        height, width = frames[0].size
-        if height < crop[0] or width < crop[1]:
-            raise TrainingError(too_small(str(location), (height, width), crop))
         sources.append(Source(frames, weight, data_fingerprint(opened.location, frames)))
         if not validation:
             held_out.extend(opened.validation_frames())
+    check_sizes(
+        [(str(location), each.frames[0].size) for (location, _), each in zip(data, sources, strict=True)],
+        crop,
+    )
     for location in validation:
         held_out.extend(open_source(location).held_out_frames())
     return sources, held_out
 
 
-def too_small(name: str, size: tuple[int, ...], crop: tuple[int, int]) -> str:
-    """The sentence about frames that hold no crop; sizes are (height, width)."""
-    return f"{name}: frames of {size[1]}x{size[0]} are smaller than the preset's {crop[1]}x{crop[0]} crops"
+def check_sizes(sizes: Sequence[tuple[str, tuple[int, int]]], crop: tuple[int, int]) -> None:
+    """Raise TrainingError for the first data set, named with its frames' (height, width), that holds no crop; the crop
+    it proposes fits them all."""
+    smallest = min(height for _, (height, _) in sizes), min(width for _, (_, width) in sizes)
+    for name, size in sizes:
+        if size[0] < crop[0] or size[1] < crop[1]:
+            raise TrainingError(too_small(name, size, crop, smallest))
+
+
+def too_small(name: str, size: tuple[int, ...], crop: tuple[int, int], smallest: tuple[int, ...]) -> str:
+    """The sentence about frames that hold no crop, with one that fits `smallest`; sizes are (height, width)."""
+    said = f"{name}: frames of {size[1]}x{size[0]} are smaller than the {crop[1]}x{crop[0]} crops"
+    height, width = (min(least // STRIDE * STRIDE, side) for least, side in zip(smallest, crop, strict=True))
+    if min(height, width) < STRIDE:
+        return f"{said}, and no crop can be smaller than {STRIDE}x{STRIDE}"
+    return f"{said}; crops of {width}x{height} fit (--crop {width}x{height})"

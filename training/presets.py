@@ -22,6 +22,7 @@ from training.errors import TrainingError
 from training.free import FREE_FEATURES
 from training.losses import STAGE_WEIGHTS, STATIC_WEIGHTS, ScaleWeights
 from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
+from training.networks.dispnet import STRIDE
 
 Task = Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free", "joint"]
 TASKS: tuple[Task, ...] = get_args(Task)
@@ -383,12 +384,9 @@ def change_preset(preset: Preset, changes: Mapping[str, Any]) -> Preset:
                 f"{name} does not apply here: a {type(preset).__name__} has {', '.join(known)}"
             )
     changed = replace(preset, **changes)
-    if (
-        changed.crop_width % 64
-        or changed.crop_height % 64
-        or min(changed.crop_width, changed.crop_height) < 64
-    ):
+    sides = changed.crop_width, changed.crop_height
+    if any(side % STRIDE for side in sides) or min(sides) < STRIDE:
         raise TrainingError(
-            f"crops must be multiples of 64 each way, not {changed.crop_width}x{changed.crop_height}"
+            f"crops must be multiples of {STRIDE} each way, not {changed.crop_width}x{changed.crop_height}"
         )
     return changed

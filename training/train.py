@@ -125,6 +125,7 @@ def train(
     steps = preset.steps if steps is None else steps
     if steps < 1:
         raise TrainingError(f"a run needs at least one step, got {steps}")
+    _require_regressor(task, preset, out, init)
     hardware = trainer_options(device, precision)
     sources, held_out = open_sources(data, (preset.crop_height, preset.crop_width), validation)
     if pseudo is not None:
@@ -186,6 +187,22 @@ def train(
     return read_summary(out, written_by(task)[0])
 
 
+def _require_regressor(task: str, preset: Preset, out: Path, init: Path | None) -> None:
+    """Raise TrainingError where the regressor to build on is missing: the first thing to know, before any data."""
+    if isinstance(preset, JointPreset) and (init is None or init.resolve() == out.resolve()):
+        raise TrainingError("joint starts from another run folder's networks: name it as init (--init)")
+    if isinstance(preset, FreeConfNetPreset | FreeGradNetPreset):
+        return
+    if isinstance(preset, RegressorPreset) and init is None:
+        return
+    folder = out if init is None else init
+    if not has_weights(folder, "regressor"):
+        raise TrainingError(
+            f"{folder}: holds no trained regressor, which {task} starts from; train one into it first, or name the run "
+            "folder that has one as init (--init)"
+        )
+
+
 def written_by(task: str) -> tuple[str, ...]:
     """The networks that a task leaves in its run folder."""
     return ("confnet", "gradnet") if task == "joint" else (task,)
@@ -238,8 +255,6 @@ def _build_task(
         return RegressorTask(preset, _new_regressor(preset, module, init), steps, seed), None
     if isinstance(preset, FreeConfNetPreset | FreeGradNetPreset):
         return _build_free_task(preset, module, steps, seed), None
-    if isinstance(preset, JointPreset) and (init is None or init.resolve() == out.resolve()):
-        raise TrainingError("joint starts from another run folder's networks: name it as init (--init)")
     regressor = load_regressor(_with_regressor(out, init))
     if isinstance(preset, FineTuningPreset):
         return FineTuningTask(preset, regressor.network, steps, seed), None

@@ -112,7 +112,7 @@ def test_frames_smaller_than_the_crop_are_named(tmp_path: Path) -> None:
         code = np.ones((80, width), np.uint16)
         published.png(tmp_path / f"training/disp_occ_0/{index:06d}_10.png", code)
     sources, _ = open_sources([(tmp_path, 1.0)], (64, 64))
-    with pytest.raises(TrainingError, match="000001_10: frames of 60x80 are smaller than the preset's 64x64"):
+    with pytest.raises(TrainingError, match="000001_10: frames of 60x80 are smaller than the 64x64"):
         list(StereoDataModule(sources, [], PRESET, 5, 0).block(0))
 
 
@@ -137,7 +137,7 @@ def test_wrong_requests_are_sentences(folders: tuple[Path, Path], tmp_path: Path
         open_sources([], (64, 64))
     with pytest.raises(TrainingError, match="weight of a data set must be positive, got 0"):
         open_sources([(folders[0], 0.0)], (64, 64))
-    with pytest.raises(TrainingError, match="frames of 128x64 are smaller than the preset's 256x64 crops"):
+    with pytest.raises(TrainingError, match="frames of 128x64 are smaller than the 256x64 crops"):
         open_sources([(folders[0], 1.0)], (64, 256))
     with pytest.raises(DatasetError, match="no such folder"):
         open_sources([(tmp_path / "nothing", 1.0)], (64, 64))

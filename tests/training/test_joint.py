@@ -244,12 +244,21 @@ def test_the_command_trains_through_validated_parameters_and_hands_them_on(
 
 def test_wrong_requests_are_sentences(data: Path, start: Path, tmp_path: Path) -> None:
     source = [(data, 1.0)]
-    with pytest.raises(TrainingError, match="already holds a confnet"):
+    with pytest.raises(TrainingError, match="another run folder"):
         train("joint", source, start, quick("joint"), init=start, progress=False)
+    with pytest.raises(TrainingError, match="already holds a confnet"):
+        train(
+            "joint",
+            source,
+            shutil.copytree(start, tmp_path / "copy"),
+            quick("joint"),
+            init=start,
+            progress=False,
+        )
     with pytest.raises(TrainingError, match="name it as init"):
         train("joint", source, tmp_path / "none", quick("joint"), progress=False)
     with pytest.raises(TrainingError, match="only joint trains through a refinement"):
-        train("confnet", source, tmp_path / "conf", quick("confnet"), refinement=Ours(), progress=False)
+        train("confnet", source, tmp_path / "conf", quick("confnet"), init=start, refinement=Ours())
     bare = tmp_path / "bare"
     bare.mkdir()
     for file in start.glob("regressor.*"):

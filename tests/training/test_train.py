@@ -18,6 +18,7 @@ from datagen import DatasetError, StereoDataset
 from tests.datagen.sources import published
 from tests.training.synthetic import random_pair, write_dataset
 from training.augmentation import NO_AUGMENTATION
+from training.data import check_sizes
 from training.errors import TrainingError
 from training.networks import DispNetConfig
 from training.predict import StereoPredictor
@@ -332,11 +333,28 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
         train("regressor", source, run, quick_regressor(), steps=7, resume=True, progress=False)
     with pytest.raises(TrainingError, match="no device 'abacus'"):
         train("regressor", source, tmp_path / "device", quick_regressor(), device="abacus")
-    with pytest.raises(TrainingError, match="frames of 128x64 are smaller"):
+    with pytest.raises(
+        TrainingError, match=r"frames of 128x64 are smaller than the 320x128 .* \(--crop 128x64\)"
+    ):
         train("regressor", source, tmp_path / "crop", "tiny")
+    # What is said first of a request with two faults: the one that --crop does not cure.
+    with pytest.raises(
+        TrainingError, match="holds no trained regressor, which confnet starts from; train one"
+    ):
+        train("confnet", source, tmp_path / "crop", "tiny")
     with pytest.raises(DatasetError, match="no such folder"):
         train("regressor", [(tmp_path / "nowhere", 1.0)], tmp_path / "x", "tiny")
     assert not (tmp_path / "x").exists()
+
+
+def test_a_proposed_crop_fits_all_data_sets_and_is_within_the_preset_s() -> None:
+    sizes = [("wide", (96, 400)), ("small", (200, 150))]
+    for crop, proposal in (((128, 320), "128x64"), ((192, 128), "128x64")):
+        with pytest.raises(TrainingError, match=rf"^wide: frames of 400x96 .* \(--crop {proposal}\)$"):
+            check_sizes(sizes, crop)
+    check_sizes(sizes, (64, 128))
+    with pytest.raises(TrainingError, match=r"frames of 150x40 .* no crop can be smaller than 64x64"):
+        check_sizes([("flat", (40, 150))], (128, 320))
 
 
 def test_another_regressor_is_not_overwritten(data: Path, run: Path, tmp_path: Path) -> None:
