@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
@@ -19,7 +20,13 @@ def read_color_image(path: Path) -> NDArray[np.uint8]:
     Raises CommandError for a missing file, one that is no picture, or one that is too large.
     """
     if not path.is_file():
-        raise CommandError(f"{path}: there is no such file")
+        raise CommandError(
+            f"{path}: is a folder, not a picture" if path.is_dir() else f"{path}: there is no such file"
+        )
+    if path.suffix.lower() == ".pfm":  # The decoder would round it to bytes.
+        raise CommandError(
+            f"{path}: is a map of numbers, not a picture; a disparity is given with --disparity"
+        )
     try:
         shape = iio.improps(path).shape
         if max(shape[:2]) > LARGEST_SIDE_PX:
@@ -27,12 +34,27 @@ def read_color_image(path: Path) -> NDArray[np.uint8]:
         pixels = np.asarray(iio.imread(path))
     except CommandError:
         raise
-    except Exception as error:  # every decoder has its own exceptions
-        raise CommandError(f"{path}: is not a picture that can be read ({error})") from error
+    except Exception as error:  # every decoder has its own exceptions, in words of its own
+        raise CommandError(
+            f"{path}: is no picture that can be read (PNG, JPEG, TIFF, ...), or a damaged one"
+        ) from error
+    return _as_color(path, pixels)
+
+
+def _as_color(path: Path, pixels: NDArray[Any]) -> NDArray[np.uint8]:
+    """What a decoder gave as (H, W, 3) uint8."""
     if pixels.dtype == np.uint16:
         pixels = np.rint(pixels / 257.0).astype(np.uint8)
+    if pixels.dtype == np.bool_:
+        pixels = np.where(pixels, 255, 0).astype(np.uint8)
+    if pixels.dtype != np.uint8:
+        raise CommandError(f"{path}: holds {pixels.dtype} values; a picture has 8 or 16 bits a channel")
     if pixels.ndim == 2:
         pixels = np.repeat(pixels[..., None], 3, axis=2)
-    if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.dtype != np.uint8:
-        raise CommandError(f"{path}: needs to be a grey or colour picture, got {pixels.dtype} {pixels.shape}")
+    if pixels.ndim == 4:
+        raise CommandError(f"{path}: holds {len(pixels)} pictures; one is needed")
+    if pixels.shape[2] not in (3, 4):
+        raise CommandError(
+            f"{path}: has {pixels.shape[2]} channels; grey, colour and colour with alpha can be read"
+        )
     return np.ascontiguousarray(pixels[..., :3])

@@ -1,0 +1,54 @@
+"""Reading a user's picture: what can be read, and one sentence in a user's words for what cannot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from datagen.formats import write_pfm
+from stereoforge.errors import CommandError
+from stereoforge.images import read_color_image
+
+COLORS = np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8)
+
+
+def test_grey_deep_and_transparent_pictures_become_8_bit_colour(tmp_path: Path) -> None:
+    path = tmp_path / "picture.png"
+    for pixels, expected in (
+        (COLORS, COLORS),
+        (COLORS[..., 0], np.repeat(COLORS[..., :1], 3, axis=2)),
+        (np.dstack([COLORS, COLORS[..., :1]]), COLORS),
+        (COLORS[..., 0].astype(np.uint16) * 257, np.repeat(COLORS[..., :1], 3, axis=2)),
+        (COLORS[..., 0] > 127, np.where(COLORS[..., :1] > 127, 255, 0).repeat(3, axis=2)),
+    ):
+        iio.imwrite(path, pixels)
+        np.testing.assert_array_equal(read_color_image(path), expected)
+
+
+def test_what_is_no_picture_is_said_without_the_decoder_s_words(tmp_path: Path) -> None:
+    whole = tmp_path / "whole.png"
+    iio.imwrite(whole, COLORS)
+    (tmp_path / "text.png").write_text("hello")
+    (tmp_path / "empty.png").touch()
+    (tmp_path / "cut.png").write_bytes(whole.read_bytes()[:500])
+    (tmp_path / "folder.png").mkdir()
+    iio.imwrite(tmp_path / "moving.gif", np.stack([COLORS, 255 - COLORS]))
+    iio.imwrite(tmp_path / "floats.tiff", COLORS.astype(np.float32))
+    write_pfm(tmp_path / "map.pfm", COLORS[..., 0].astype(np.float32))
+    unreadable = "is no picture that can be read (PNG, JPEG, TIFF, ...), or a damaged one"
+    for name, sentence in (
+        ("text.png", unreadable),
+        ("empty.png", unreadable),
+        ("cut.png", unreadable),
+        ("folder.png", "is a folder, not a picture"),
+        ("gone.png", "there is no such file"),
+        ("moving.gif", "holds 2 pictures; one is needed"),
+        ("floats.tiff", "holds float32 values; a picture has 8 or 16 bits a channel"),
+        ("map.pfm", "is a map of numbers, not a picture; a disparity is given with --disparity"),
+    ):
+        with pytest.raises(CommandError) as refusal:
+            read_color_image(tmp_path / name)
+        assert str(refusal.value) == f"{tmp_path / name}: {sentence}"
