@@ -93,6 +93,10 @@ def read_manifest(path: Path) -> SceneManifest:
         check_seal(content, digest)
     except DatasetError as error:
         raise DatasetError(f"{path}: {error}" if str(path) not in str(error) else str(error)) from error
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise DatasetError(
+            f"{path}: is not a scene's manifest, it is no JSON; verify --repair renders its scene again"
+        ) from error
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise DatasetError(f"{path}: is not a scene's manifest ({error})") from error
     return manifest

@@ -158,8 +158,15 @@ def recipe_from_text(text: bytes, origin: str) -> Recipe:
         _check_shape(text.decode("utf-8"))
         data = yaml.safe_load(text.decode("utf-8"))
     except (UnicodeDecodeError, yaml.YAMLError, RecursionError, ValueError) as error:
-        raise DatasetError(f"cannot read the recipe {origin}: {' '.join(str(error).split())}") from error
+        raise DatasetError(f"cannot read the recipe {origin}: {_reason(error)}") from error
     return recipe_from_plain(data, origin)
+
+
+def _reason(error: Exception) -> str:
+    """What is wrong with a text, and in which line, without the parser's account of what it was about to do."""
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem and error.problem_mark:
+        return f"line {error.problem_mark.line + 1}: {error.problem}"
+    return " ".join(str(error).split())
 
 
 def _check_shape(text: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from datagen.dataset import open_layout
 from datagen.executors import Executor
@@ -22,6 +22,17 @@ def broken_scenes(problems: Iterable[Problem]) -> list[tuple[str, int]]:
         (item.split, item.scene) for item in problems if item.split is not None and item.scene is not None
     }
     return sorted(found, key=lambda scene: (SPLITS.index(scene[0]), scene[1]))
+
+
+def problems_left(problems: Iterable[Problem], repaired: list[tuple[str, int]]) -> list[Problem]:
+    """Those that lie in no finished scene, without the files that a repaired scene has replaced or taken in."""
+    paths = [PurePosixPath(path) for scene in repaired for path in Layout(Path()).scene_paths(*scene)]
+    return [
+        problem
+        for problem in problems
+        if problem.scene is None
+        and not any(PurePosixPath(problem.place).is_relative_to(path) for path in paths)
+    ]
 
 
 def repair_dataset(

@@ -11,7 +11,7 @@ from typing import Annotated
 import tyro
 
 from datagen.manifest import SceneManifest
-from datagen.repair import broken_scenes, repair_dataset
+from datagen.repair import broken_scenes, problems_left, repair_dataset
 from datagen.scene_check import SAMPLED_PIXELS
 from datagen.verify import verify_dataset
 from datagen.verify_report import VerifyReport
@@ -46,7 +46,7 @@ class Verify:
         if self.repair and broken:
             console.print(f"{report}; rendering {len(broken)} scenes again")
             self._repair(broken)
-            elsewhere = sum(problem.scene is None for problem in report.problems)
+            elsewhere = len(problems_left(report.problems, broken))
             report = self._verify(broken)
             _print_problems(report)
             if elsewhere:

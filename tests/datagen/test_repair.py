@@ -52,5 +52,6 @@ def test_broken_scenes_and_no_others_are_rendered_again(
 def test_a_repaired_data_set_is_right_again(small_reference: Path, tmp_path: Path) -> None:
     root = Path(shutil.copytree(small_reference, tmp_path / "set"))
     Layout(root).file("occlusion", "train", 1, "right", 6).write_bytes(b"")
+    Layout(root).manifest("train", 2).write_text('{"family":')  # Its files then belong to no finished scene.
     assert verify(root, "--repair") == 0
     assert hashes(root) == hashes(small_reference)
