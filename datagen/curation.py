@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,14 @@ def fault_before_rendering(caster: SceneRayCaster, curation: Curation) -> str | 
     return None
 
 
+def share_outside(surfaces: NDArray[np.floating[Any]], curation: Curation) -> float:
+    """Share of the surfaces' disparities (P,) outside the range asked for; 0 without surfaces or without a range."""
+    if not curation.disparity_px or not len(surfaces):
+        return 0.0
+    low, high = curation.disparity_px
+    return float(((surfaces < low) | (surfaces > high)).mean())
+
+
 def is_textureless(image: NDArray[np.uint8], curation: Curation) -> bool:
     """Whether nearly all of a rendered (H, W, 3) picture has nothing to match."""
     return curation.enabled and textured_share(image) < curation.min_textured
@@ -85,8 +94,5 @@ def _faults(caster: SceneRayCaster, curation: Curation, frame: int) -> Iterator[
         yield "one surface fills the view"
     if (hits.occlusion != VISIBLE).mean() > curation.max_hidden:
         yield "mostly hidden from the other eye"
-    surfaces = hits.disparity[hits.object_index > 0]
-    if curation.disparity_px and len(surfaces):
-        low, high = curation.disparity_px
-        if ((surfaces < low) | (surfaces > high)).mean() > curation.max_outside:
-            yield "disparity out of range"
+    if share_outside(hits.disparity[hits.object_index > 0], curation) > curation.max_outside:
+        yield "disparity out of range"

@@ -14,6 +14,7 @@ from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, Wor
 from datagen.executors.devices import assign_devices, find_gpus
 from datagen.layout import SPLITS, Layout, scene_numbers
 from datagen.manifest import SceneManifest
+from datagen.pilot import check_device, check_disparity_range
 from datagen.quarantine import (
     QuarantinedScene,
     put_in_quarantine,
@@ -71,7 +72,8 @@ def render_dataset(
     a folder. only: render these (split, number) if they are missing, and nothing else. on_scene: called with
     (done, total, manifest or None if it failed).
 
-    Raises DatasetError if the folder holds something else: other files, or a data set of other settings; and
+    Raises DatasetError if the folder holds something else: other files, or a data set of other settings; before
+    anything is written if this machine has no such device, or scenes cannot have the disparities asked for; and
     DiskFullError, with the data set as whole as it is, when there is no room for more.
     """
     tree = open_tree(root)
@@ -82,6 +84,8 @@ def render_dataset(
     if wanted:
         _check_store(tree, recipe)
     executor = executor or local_executor(workers, device)
+    if set(wanted) - committed_scenes(tree):
+        _check_possible(recipe, device, executor)
     with staging_area(tree) as area, run_log(tree, area.folder) as log:
         _write_recipe(tree, area, merged)
         quarantined = set(quarantined_scenes(tree))
@@ -208,6 +212,13 @@ class _Run:
             f"{self.tree.name}: the disk is full; {left} scenes are missing{need}: make room and run the same "
             "command again"
         )
+
+
+def _check_possible(recipe: Recipe, device: str, executor: Executor) -> None:
+    """Raise DatasetError for what no scene would be rendered with, instead of putting all of them in quarantine."""
+    if isinstance(executor, LocalExecutor) or (isinstance(executor, RayExecutor) and executor.runs_here):
+        check_device(device)
+    check_disparity_range(recipe)
 
 
 def _merge(tree: Tree, recipe: Recipe) -> Recipe:

@@ -16,10 +16,10 @@ def call_limited(
     function: Callable[..., Result],
     args: Sequence[Any] = (),
     *,
-    memory_bytes: int = 1 << 30,
+    memory_bytes: int | None = 1 << 30,
     timeout_s: float = 60.0,
 ) -> Result:
-    """Return `function(*args)`, computed in a fresh process that may use so much memory and time.
+    """Return `function(*args)`, computed in a fresh process that may use so much memory (None: all) and time.
 
     Function, arguments and result travel by pickle between this process and its own child, so the function
     must be importable by its name. What it prints is shown nowhere. Starting the process takes a second.

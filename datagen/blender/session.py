@@ -92,19 +92,27 @@ def _configure_cycles(scene: bpy.types.Scene, settings: CyclesSettings) -> None:
     scene.render.use_persistent_data = True
 
 
+def finds_device(device: str) -> bool:
+    """Whether Cycles can compute on one of `DEVICES` here."""
+    return device == "cpu" or bool(_cycles_preferences().get_devices_for_type(device.upper()))
+
+
 def _choose_device(scene: bpy.types.Scene, device: str) -> None:
     if device == "cpu":
         scene.cycles.device = "CPU"
         return
-    preferences = bpy.context.preferences.addons["cycles"].preferences
+    if not finds_device(device):
+        raise RuntimeError(f"Blender finds no {device} device on this machine")
+    preferences = _cycles_preferences()
     preferences.compute_device_type = device.upper()
     preferences.get_devices()
-    found = [item for item in preferences.devices if item.type == device.upper()]
-    if not found:
-        raise RuntimeError(f"Blender finds no {device} device on this machine")
     for item in preferences.devices:
         item.use = item.type == device.upper()
     scene.cycles.device = "GPU"
+
+
+def _cycles_preferences() -> bpy.types.AddonPreferences:
+    return bpy.context.preferences.addons["cycles"].preferences
 
 
 def _configure_output(scene: bpy.types.Scene) -> None:

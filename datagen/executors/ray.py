@@ -47,6 +47,13 @@ class RayExecutor:
     def threads(self) -> int:
         return self.cpus_per_job
 
+    @property
+    def runs_here(self) -> bool:
+        """Whether all jobs run on this machine."""
+        import ray
+
+        return self.address is None and not ray.is_initialized()
+
     def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Outcomes[Job, Result]:
         import ray
 
