@@ -81,12 +81,13 @@ def evaluate_set(
 ) -> EvaluatedSet:
     """Run the networks and every method on every frame, showing progress."""
     with progress_bar() as progress:
-        task = progress.add_task(f"evaluating on {data.name}", total=len(data.frames))
+        what = f"evaluating on {data.name}"
+        task = progress.add_task(f"{what} (compiling, after an install)", total=len(data.frames))
         evaluation = evaluate(
             (predictors.frame(frame) for frame in data.frames),
             methods,
             options or evaluation_options(data.family),
-            progress=lambda done, _: progress.update(task, completed=done),
+            progress=lambda done, _: progress.update(task, completed=done, description=what),
         )
     return EvaluatedSet(data.name, evaluation, data.family, data.split, data.facts)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -116,6 +117,21 @@ def test_frames_are_read_one_at_a_time_and_progress_is_told():
 
     evaluate(frames(), [Regressor()], progress=lambda done, name: told.append((done, name)))
     assert told == [(seed + 1, f"TEST/A/{seed:04d}/0006") for seed in range(4)]
+
+
+def test_compiling_at_the_first_run_is_not_counted_as_a_method_s_time():
+    runs = []
+
+    class Compiled(Regressor):
+        def run(self, frame):
+            runs.append(frame.name)
+            if len(runs) == 1:
+                time.sleep(0.3)
+            return MethodOutput(disparity=frame.disparity)
+
+    evaluation = evaluate([toy_frame(seed, 12, 16) for seed in (0, 1)], [Compiled()])
+    assert evaluation.scores["regressor"].seconds < 0.1
+    assert len(runs) == 3
 
 
 def test_methods_without_their_inputs_are_skipped_and_named():
