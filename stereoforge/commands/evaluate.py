@@ -105,7 +105,7 @@ class Evaluate:
             notes += fallback_notes(self.weights)
         skipped = sets[0].evaluation.skipped
         for note in (*notes, *(reason for name, reason in skipped.items() if name not in lacking)):
-            console.print(note, markup=False)
+            console.print(note, markup=False, soft_wrap=True)
         frames = ", ".join(f"{len(each.evaluation.frames)} of {each.name}" for each in sets)
         console.print(f"{files.html}: frames evaluated: {frames}", markup=False)
         if self.submission:

@@ -73,5 +73,5 @@ class Tune:
                 table.add_row(name, *values, shown_values(result.method))
         console.print(table)
         for note in notes:
-            console.print(note, markup=False)
+            console.print(note, markup=False, soft_wrap=True)
         console.print(f"{out}: {len(tuned)} methods, validated on {len(frames)} frames", markup=False)
