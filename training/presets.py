@@ -196,10 +196,11 @@ SMALL_REGRESSOR = RegressorPreset(
 TINY_REGRESSOR = replace(
     SMALL_REGRESSOR,
     steps=800,
-    optimizer=replace(SMALL_OPTIMIZER, warmup_steps=40),
+    optimizer=replace(SMALL_OPTIMIZER, learning_rate=2e-3, warmup_steps=40),
     validation_interval=200,
     validation_samples=16,
 )
+"""At twice the rate so short a run gets 8 to 9 % further (docs/ablations.md)."""
 
 FULL_FINE_TUNING = FineTuningPreset(
     steps=100_000,
