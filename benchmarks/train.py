@@ -262,9 +262,12 @@ def measure_preset(task_name: str, name: str, crops: int, iterations: int) -> No
 
 
 def presets(names: list[str], iterations: int, full_crops: int) -> None:
-    """Each preset in a process of its own."""
+    """Each preset in a process of its own; not `joint`, whose solves take as long as the pictures want
+    (`benchmarks.differentiable`)."""
     context = multiprocessing.get_context("spawn")
     for task_name, kinds in PRESETS.items():
+        if task_name == "joint":
+            continue
         for name in (name for name in names if name in kinds):
             crops = full_crops if name == "full" else kinds[name].batch_size
             process = context.Process(target=measure_preset, args=(task_name, name, crops, iterations))
