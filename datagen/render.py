@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -84,8 +84,7 @@ def render_dataset(
     if wanted:
         _check_store(tree, recipe)
     executor = executor or local_executor(workers, device)
-    if set(wanted) - committed_scenes(tree):
-        _check_possible(recipe, device, executor)
+    _check_possible(recipe, device, executor, tree, wanted)
     with staging_area(tree) as area, run_log(tree, area.folder) as log:
         _write_recipe(tree, area, merged)
         quarantined = set(quarantined_scenes(tree))
@@ -214,8 +213,13 @@ class _Run:
         )
 
 
-def _check_possible(recipe: Recipe, device: str, executor: Executor) -> None:
+def _check_possible(
+    recipe: Recipe, device: str, executor: Executor, tree: Tree, wanted: Sequence[tuple[str, int]]
+) -> None:
     """Raise DatasetError for what no scene would be rendered with, instead of putting all of them in quarantine."""
+    asks = device != "cpu" or recipe.curation.disparity_px is not None
+    if not asks or not set(wanted) - committed_scenes(tree):  # to list a large store takes a while
+        return
     if isinstance(executor, LocalExecutor) or (isinstance(executor, RayExecutor) and executor.runs_here):
         check_device(device)
     check_disparity_range(recipe)

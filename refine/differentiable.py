@@ -7,8 +7,8 @@ gradient of a loss with respect to any of it costs one more solve: with A' lambd
 
 whatever the solver, and with no memory kept of its iterations. On CPUs the exact form, which is its own transpose, is
 solved by the kernels of `refine.solvers`, a sample at a time; the paper's form, and either on other devices, by torch's
-own operations, the batch at once (a CPU takes some fifteen times as long for that). Needs torch, which `import refine`
-does not.
+own operations, the batch at once (a CPU takes fifteen to thirty times as long for that). Needs torch, which
+`import refine` does not.
 """
 
 from __future__ import annotations

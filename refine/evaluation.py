@@ -177,9 +177,8 @@ class _Run:
             if lacking := method.lacks(frame):
                 raise ValueError(f"frame {frame.name} comes without {lacking}, unlike the first frame")
             if not self.scores:
-                method.run(
-                    frame
-                )  # After an install it compiles for minutes, which are not the method's time.
+                # After an install this compiles for minutes, which are not the method's time.
+                method.run(frame)
             began = time.perf_counter()
             output = method.run(frame)
             pool = self._empty_pool()

@@ -62,8 +62,10 @@ class JobProgress(Progress):
 
     def _say(self, task_id: TaskID) -> None:
         now = time.monotonic()
+        if self.console.is_terminal or now - self._said < LINE_EVERY_S:
+            return
         task = next(each for each in self.tasks if each.id == task_id)
-        if self.console.is_terminal or now - self._said < LINE_EVERY_S or not task.total or task.finished:
+        if not task.total or task.finished:
             return
         self._said = now
         line = ", ".join(text.format(task=task) for text in self._texts)

@@ -62,8 +62,10 @@ class GivenSystem:
 
     def __init__(self, couplings: Couplings) -> None:
         tau = couplings.tau
+        # As for `solve_multigrid`: the hierarchy first, and nothing of the whole image is made for it.
+        below = coarsen(tau, lambda first, last: couplings.rows(first, last).positive(), COLOR_SCALE)
         self._operator = operator_of(tau, couplings.rows, "exact")
-        self._cycle = Cycle(self._operator, coarsen(tau, couplings.positive().rows, COLOR_SCALE))
+        self._cycle = Cycle(self._operator, below)
 
     def solve(self, b: Floats, tolerance: float) -> Iterated:
         """Down to a residual of tolerance |b|; `Iterated.residual` tells whether it was reached. `b` is padded, and

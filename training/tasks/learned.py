@@ -22,12 +22,8 @@ from training.tasks.base import StereoTask, image_of, map_of
 from viewing import Picture, confidence_picture, error_picture, gradient_picture, side_by_side
 
 
-class ConfidenceTask(StereoTask):
-    """Cross-entropy of "correct within t" (section 3.2 of the paper)."""
-
-    monitor = "validation/auc"
-    network: ConfNet
-    correct_within_px: float
+class DisparityTask(StereoTask):
+    """A network that learns something about a disparity it is given."""
 
     @abstractmethod
     def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
@@ -35,7 +31,15 @@ class ConfidenceTask(StereoTask):
 
     @abstractmethod
     def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        """The disparity and the kept network's confidence, of a frame of any size."""
+        """The disparity, and what the kept network says of it, of a frame of any size."""
+
+
+class ConfidenceTask(DisparityTask):
+    """Cross-entropy of "correct within t" (section 3.2 of the paper)."""
+
+    monitor = "validation/auc"
+    network: ConfNet
+    correct_within_px: float
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, disparity = self.head_inputs(batch)
@@ -66,7 +70,7 @@ class ConfidenceTask(StereoTask):
         )
 
 
-class GradientTask(StereoTask):
+class GradientTask(DisparityTask):
     """Masked L1 on the disparity's forward differences (section 3.3 of the paper)."""
 
     monitor = "validation/gradient"
@@ -74,14 +78,6 @@ class GradientTask(StereoTask):
     threshold_px: float
     initial: ClassVar[str]
     """What the disparity comes from, whose own gradients are the ones to do better than."""
-
-    @abstractmethod
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
-        """What the network sees of training crops, and the disparity it is about."""
-
-    @abstractmethod
-    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        """The disparity and the kept network's gradient, of a frame of any size."""
 
     def loss(self, batch: Batch) -> Tensor:
         inputs, _ = self.head_inputs(batch)
