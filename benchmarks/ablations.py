@@ -1,22 +1,35 @@
 """The small presets' open choices, one changed at a time, with equal budgets on the same validation frames.
 
     python -m benchmarks.ablations --data DATASET --out DIR [--steps 1500] [--head-steps 600] [--only NAME ...]
+    python -m benchmarks.ablations --data DATASET --graded DATASET --out DIR --only curriculum
     python -m benchmarks.ablations --out DIR --table        # what is finished so far, as Markdown
 
 Each row trains one network from the same seed; heads stand on `--regressor RUN`, or on the group `regressor`'s own
 `base`. A row that is finished is not trained again, so a stopped comparison continues. The figures are those of the
-kept (best) weights on the data set's val split, which the test sets share nothing with.
+kept (best) weights on the data set's val split, which the test sets share nothing with. Where the run that heads stand
+on has the other head too, ConfNet's rows are also judged by one rule for all thresholds of its labels: areas at 1 and
+3 px, and the refinement's errors with that run's parameters.
+
+`--graded` is a set like `--data` of which a part was rendered from simple to complex (`render --curriculum`).
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import torch
+
+from datagen.source import open_source
+from refine.tuning import measure
+from stereoforge.prediction import open_predictors, open_settings
+from training.metrics import sparsification_auc
 from training.presets import (
     SMALL_CONFNET,
     SMALL_GRADNET,
@@ -29,6 +42,7 @@ from training.presets import (
     RegressorPreset,
 )
 from training.train import train
+from training.weights import has_weights
 
 FINEST_ONLY = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 EVEN = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
@@ -73,6 +87,16 @@ def regressors() -> dict[str, Preset]:
     }
 
 
+def curricula() -> dict[str, Preset]:
+    """On the graded set: the order of its frames ignored, or followed over a part of the run."""
+    base = SMALL_REGRESSOR
+    return {
+        "graded, mixed": base,
+        "graded, simple first, 0.3": replace(base, curriculum=0.3),
+        "graded, simple first, 0.6": replace(base, curriculum=0.6),
+    }
+
+
 def heads(base: ConfNetPreset | GradNetPreset, dropouts: dict[str, float]) -> dict[str, Preset]:
     """What both heads are compared in; `dropouts` are further rows by their names."""
     changes: dict[str, dict[str, Any]] = {
@@ -81,6 +105,7 @@ def heads(base: ConfNetPreset | GradNetPreset, dropouts: dict[str, float]) -> di
         "no normalisation": {"normalization": "none"},
         "dilations 1, 2, 4, 4": {"dilations": (1, 2, 4, 4)},
         "width 64": {"width": 64, "hidden": 128},
+        "32 features": {"features": "decoded"},
     }
     rows = {name: replace(base, network=replace(base.network, **change)) for name, change in changes.items()}
     return {"base": base, **rows}
@@ -94,6 +119,10 @@ def confnets() -> dict[str, Preset]:
         "dilations 1": replace(base, network=narrow),
         "no evidence": replace(base, network=replace(base.network, evidence=False)),
         "neither": replace(base, network=replace(narrow, evidence=False)),
+        **{
+            f"labels within {threshold:g} px": replace(base, correct_within_px=threshold)
+            for threshold in (0.5, 2.0, 3.0)
+        },
     }
 
 
@@ -106,7 +135,7 @@ def gradnets() -> dict[str, Preset]:
     }
 
 
-GROUPS = {"regressor": regressors, "confnet": confnets, "gradnet": gradnets}
+GROUPS = {"regressor": regressors, "curriculum": curricula, "confnet": confnets, "gradnet": gradnets}
 
 
 def run(task: str, name: str, preset: Preset, options: argparse.Namespace) -> None:
@@ -114,13 +143,15 @@ def run(task: str, name: str, preset: Preset, options: argparse.Namespace) -> No
     finished = folder / "ablation.json"
     if finished.exists():
         return
-    steps = options.steps if task == "regressor" else options.head_steps
+    on_regressor = task in ("confnet", "gradnet")
+    steps = options.head_steps if on_regressor else options.steps
     preset = replace(preset, validation_interval=max(1, steps // 4))
-    init = None if task == "regressor" else options.regressor or options.out / "regressor" / "base"
+    init = (options.regressor or options.out / "regressor" / "base") if on_regressor else None
+    data = options.graded if task == "curriculum" else options.data
     began = time.perf_counter()
     summary = train(
-        task, [(options.data, 1.0)], folder, preset, init=init, steps=steps, seed=options.seed,
-        device="cpu", resume=True,
+        task if on_regressor else "regressor", [(data, 1.0)], folder, preset, validation=[options.data], init=init,
+        steps=steps, seed=options.seed, device="cpu", resume=True,
     )  # fmt: skip
     row = {
         "name": name,
@@ -128,8 +159,32 @@ def run(task: str, name: str, preset: Preset, options: argparse.Namespace) -> No
         "seconds": round(time.perf_counter() - began, 1),
         **summary.validation,
     }
+    if task == "confnet" and init is not None and has_weights(init, "gradnet"):
+        row |= judge(folder, init, options.data)
     finished.write_text(json.dumps(row, indent=2) + "\n", encoding="utf-8")
     print(task, row, flush=True)
+
+
+def judge(run: Path, source: Path, data: Path) -> dict[str, float]:
+    """Of a ConfNet on the validation frames, whatever it took as correct: areas under the sparsification curve, and the
+    errors of the refinement with the other networks and the parameters of `source`."""
+    for name in ("gradnet.safetensors", "gradnet.json"):
+        shutil.copy(source / name, run / name)
+    predictors = open_predictors(run, "cpu")
+    frames = [predictors.frame(sample) for sample in open_source(data).held_out_frames()]
+    refined = measure(open_settings(None, source).ours, frames)
+
+    def area(threshold: float) -> float:
+        maps = ((frame.confidence, frame.disparity, frame.truth) for frame in frames)
+        return float(np.mean([sparsification_auc(*map(torch.from_numpy, each), threshold) for each in maps]))
+
+    return {
+        "auc at 1 px": area(1.0),
+        "auc at 3 px": area(3.0),
+        "refined epe": refined.epe,
+        "refined bad1": refined.bad,
+        "refined gradient": refined.gradient,
+    }
 
 
 def table(task: str, names: list[str], out: Path) -> str:
@@ -157,6 +212,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", type=Path)
+    parser.add_argument("--graded", type=Path, help="what the group curriculum trains on")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--regressor", type=Path, help="run folder the heads stand on")
     parser.add_argument("--steps", type=int, default=1500)
@@ -167,7 +223,7 @@ def main() -> None:
     options = parser.parse_args()
     for task, presets in GROUPS.items():
         known = presets()
-        if not options.table:
+        if not options.table and (task != "curriculum" or options.graded):
             for name, preset in known.items():
                 if not options.only or task in options.only or f"{task}:{name}" in options.only:
                     run(task, name, preset, options)

@@ -68,16 +68,15 @@ def random_batch(preset: Preset, crops: int) -> Batch:
 def build_task(preset: Preset, regressor_preset: RegressorPreset) -> StereoTask:
     """The task of a preset on new networks."""
     network = DispNetCorr1D(regressor_preset.network)
-    channels = network.feature_channels
     if isinstance(preset, RegressorPreset):
         return RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0)
     if isinstance(preset, FineTuningPreset):
         return FineTuningTask(preset, network, preset.steps, 0)
     if isinstance(preset, ConfNetPreset):
-        head = ConfNet(replace(preset.network, feature_channels=channels))
+        head = ConfNet(preset.network.on(network))
         return ConfNetTask(preset, network, head, preset.steps, 0)
     if isinstance(preset, GradNetPreset):
-        grad_head = GradNet(replace(preset.network, feature_channels=channels))
+        grad_head = GradNet(preset.network.on(network))
         return GradNetTask(preset, network, grad_head, preset.steps, 0)
     if isinstance(preset, FreeConfNetPreset):
         return FreeConfNetTask(preset, ConfNet(preset.network), preset.steps, 0)

@@ -7,6 +7,7 @@ that number alone, so results depend neither on the number of workers nor on whe
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +38,8 @@ from training.provenance import data_fingerprint
 DEFAULT_CACHE_BYTES = 2 << 30
 IMAGE_MEAN_FRAMES = 100
 SHARDS_TOGETHER = 8
+CURRICULUM_PARTS = 10
+"""A curriculum adds a tenth of every data set at a time."""
 
 Batch = dict[str, Tensor]
 """`left`, `right` (B, 3, H, W) in 0..1, `disparity` (B, 1, H, W), `gradient` (B, 2, H, W), NaN invalid."""
@@ -96,23 +99,47 @@ class PairCache:
                     yield index, frame
 
 
-def schedule_draws(sources: Sequence[Source], draws: int, seed: int) -> NDArray[np.int64]:
+def schedule_draws(
+    sources: Sequence[Source], draws: int, seed: int, curriculum: float = 0.0
+) -> NDArray[np.int64]:
     """Which (source, frame) each draw takes, (draws, 2): sources by weight, frames in a new order every pass.
 
-    A longer schedule begins with the shorter one. Shards are taken a few at a time, so that remote ones can be
-    fetched as the run goes on.
+    Over the first `curriculum` of the draws (0..1) the frames are those of a growing first part of every source, in the
+    source's own order. Without, a longer schedule begins with the shorter one. Shards are taken a few at a time, so
+    that remote ones can be fetched as the run goes on.
     """
     weights = np.array([source.weight for source in sources], np.float64)
     rng = np.random.default_rng([seed, 0])
     chosen = np.searchsorted(np.cumsum(weights / weights.sum())[:-1], rng.random(draws), side="right")
+    parts = np.arange(1, CURRICULUM_PARTS)
+    ends = np.rint(draws * curriculum * parts / parts[-1]).astype(int)
     schedule = np.empty((draws, 2), np.int64)
     for index, source in enumerate(sources):
         places = np.flatnonzero(chosen == index)
         order = np.random.default_rng([seed, 1, index])
-        passes = [shuffle(order, source.frames) for _ in range(-(-len(places) // len(source.frames)))]
+        frames = [
+            _passes(order, source.frames, share, len(stage))
+            for share, stage in zip(
+                np.append(parts, CURRICULUM_PARTS) / CURRICULUM_PARTS,
+                np.split(places, np.searchsorted(places, ends)),
+                strict=True,
+            )
+        ]
         schedule[places, 0] = index
-        schedule[places, 1] = np.concatenate([*passes, np.empty(0, np.int64)])[: len(places)]
+        schedule[places, 1] = np.concatenate(frames)
     return schedule
+
+
+def _passes(
+    rng: np.random.Generator, frames: Sequence[StereoFrame], share: float, count: int
+) -> NDArray[np.int64]:
+    """`count` frames: the first `share` of all, pass after pass."""
+    first = math.ceil(len(frames) * share)
+    passes = [np.empty(0, np.int64)]
+    for _ in range(-(-count // first)):
+        order = shuffle(rng, frames)
+        passes.append(order[order < first])
+    return np.concatenate(passes)[:count]
 
 
 def shuffle(rng: np.random.Generator, frames: Sequence[StereoFrame]) -> NDArray[np.int64]:
@@ -218,7 +245,7 @@ class StereoDataModule(pl.LightningDataModule):
         """The crops of the steps [number * validation_interval, (number + 1) * validation_interval)."""
         size = self._preset.batch_size
         per_step = size * processes
-        schedule = schedule_draws(self._sources, self._steps * per_step, self._seed)
+        schedule = schedule_draws(self._sources, self._steps * per_step, self._seed, self._preset.curriculum)
         interval = self._preset.validation_interval
         steps = range(number * interval, min((number + 1) * interval, self._steps))
         batches = [list(range(s * per_step + rank * size, s * per_step + (rank + 1) * size)) for s in steps]

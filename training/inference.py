@@ -8,7 +8,14 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
 
-from training.networks import ConfNet, DispNetCorr1D, GradNet, full_resolution, left_right_consistency
+from training.networks import (
+    ConfNet,
+    DispNetCorr1D,
+    GradNet,
+    HeadConfig,
+    full_resolution,
+    left_right_consistency,
+)
 from training.networks.dispnet import STRIDE
 from training.networks.evidence import Evidence
 
@@ -20,6 +27,12 @@ class Regression(NamedTuple):
     """(B, 1, H, W) px of the input, not negative."""
     features: Tensor
     """(B, F, H/2, W/2) matching features."""
+    decoded: Tensor
+    """(B, F, H/2, W/2) what the disparity was made of."""
+
+    def features_for(self, config: HeadConfig) -> Tensor:
+        """The features that a head was trained on."""
+        return self.features if config.features == "joined" else self.decoded
 
 
 class HeadInputs(NamedTuple):
@@ -46,7 +59,7 @@ def regress(regressor: DispNetCorr1D, left: Tensor, right: Tensor) -> Regression
     """Disparity and features of images (B, 3, H, W) whose sides are multiples of 64."""
     output = regressor(left, right)
     disparity = F.relu(full_resolution(output.disparities[-1], left.shape[-2:]))
-    return Regression(disparity, output.features)
+    return Regression(disparity, output.features, output.decoded)
 
 
 def regress_consistently(regressor: DispNetCorr1D, left: Tensor, right: Tensor) -> tuple[Regression, Tensor]:
@@ -58,7 +71,7 @@ def regress_consistently(regressor: DispNetCorr1D, left: Tensor, right: Tensor) 
     both = regress(regressor, torch.cat([left, right.flip(-1)]), torch.cat([right, left.flip(-1)]))
     disparity_left, disparity_right = both.disparity[:batch], both.disparity[batch:].flip(-1)
     consistency = left_right_consistency(disparity_left, disparity_right)
-    return Regression(disparity_left, both.features[:batch]), consistency
+    return Regression(disparity_left, both.features[:batch], both.decoded[:batch]), consistency
 
 
 def head_inputs(
@@ -72,8 +85,10 @@ def head_inputs(
     else:
         regression, consistency = regress_consistently(regressor, left, right)
         evidence = Evidence(left, right, regression.disparity)
-        for_confnet = confnet.inputs(regression.features, consistency, evidence)
-    for_gradnet = () if gradnet is None else gradnet.inputs(regression.features, evidence)
+        for_confnet = confnet.inputs(regression.features_for(confnet.config), consistency, evidence)
+    for_gradnet: tuple[Tensor, ...] = ()
+    if gradnet is not None:
+        for_gradnet = gradnet.inputs(regression.features_for(gradnet.config), evidence)
     return HeadInputs(regression, for_confnet, for_gradnet)
 
 

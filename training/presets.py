@@ -66,6 +66,9 @@ class Preset:
     ema_decay: float | None = None
     """Validate and keep an exponential moving average of the weights with this decay a step; None keeps the weights
     themselves."""
+    curriculum: float = 0.0
+    """Share of the run over which the crops come from a growing first part of every data set, in its own order, so that
+    one rendered from simple to complex is seen that way; 0 draws from all from the beginning (ours)."""
 
 
 @dataclass(frozen=True, kw_only=True)

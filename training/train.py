@@ -267,13 +267,12 @@ def _build_task(
         )
         joint = JointTask(preset, regressor.network, heads.train(), refinement, steps, seed)
         return joint, regressor.sha256
-    channels = regressor.network.feature_channels
     task: ConfNetTask | GradNetTask
     if isinstance(preset, ConfNetPreset):
-        confnet = ConfNet(replace(preset.network, feature_channels=channels))
+        confnet = ConfNet(preset.network.on(regressor.network))
         task = ConfNetTask(preset, regressor.network, confnet, steps, seed)
     elif isinstance(preset, GradNetPreset):
-        gradnet = GradNet(replace(preset.network, feature_channels=channels))
+        gradnet = GradNet(preset.network.on(regressor.network))
         task = GradNetTask(preset, regressor.network, gradnet, steps, seed)
     else:
         raise TypeError(f"no task trains a {type(preset).__name__}")

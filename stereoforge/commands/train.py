@@ -56,6 +56,9 @@ class Train:
     """confnet: a disparity this close to the truth counts as correct (KITTI: 3)."""
     ema: Annotated[float | None, shown("DECAY", "none")] = None
     """Validate and keep a moving average of the weights, for example 0.999."""
+    curriculum: Annotated[float, shown("SHARE")] = 0.0
+    """Share of the run over which the crops come from a growing first part of every data set, for those rendered from
+    simple to complex (render --curriculum)."""
     pseudo: Annotated[Path | None, shown("DIR", "none")] = None
     """Folder of disparities to train on instead of the data set's own truth: <frame name>.pfm or KITTI-like .png."""
     init: Annotated[Path | None, shown("RUN", "none")] = None
@@ -129,8 +132,19 @@ class Train:
         )
 
     def _train_forest(self, data: list[str]) -> None:
-        for name, given in (("steps", self.steps), ("init", self.init), ("resume", self.resume)):
-            if given:
+        for name in (
+            "steps",
+            "init",
+            "resume",
+            "validation",
+            "crop",
+            "correct_within",
+            "ema",
+            "curriculum",
+            "pseudo",
+        ):
+            if getattr(self, name):
+                name = name.replace("_", "-")
                 raise UsageError(
                     f"--{name} is for networks; a forest is trained at once, on the regressor in --out"
                 )
@@ -157,4 +171,8 @@ class Train:
             if not 0 < self.ema < 1:
                 raise UsageError(f"--ema must lie between 0 and 1, got {self.ema}")
             changes["ema_decay"] = self.ema
+        if self.curriculum:
+            if not 0 < self.curriculum <= 1:
+                raise UsageError(f"--curriculum must be a share from 0 to 1, got {self.curriculum}")
+            changes["curriculum"] = self.curriculum
         return changes

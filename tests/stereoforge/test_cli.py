@@ -105,6 +105,24 @@ def test_wrong_flags_exit_with_2(tmp_path: Path, refused: Callable[..., str]) ->
     assert not (tmp_path / "set").exists()
 
 
+def test_wrong_training_flags_exit_with_2(tmp_path: Path, refused: Callable[..., str]) -> None:
+    """Before any data is looked for."""
+    command = ("train", "confnet", "--data", tmp_path / "none", "--out", tmp_path / "run")
+    for flag, value, sentence in (
+        ("--steps", "0", "--steps must be at least 1, got 0"),
+        ("--curriculum", "1.5", "--curriculum must be a share from 0 to 1, got 1.5"),
+        ("--curriculum", "nan", "--curriculum must be a share from 0 to 1, got nan"),
+        ("--ema", "1", "--ema must lie between 0 and 1"),
+        ("--correct-within", "-1", "--correct-within must be positive"),
+        ("--crop", "big", "WIDTHxHEIGHT"),
+    ):
+        assert sentence in refused(2, *command, flag, value)
+    forest = ("train", "rdf", "--data", tmp_path / "none", "--out", tmp_path / "run")
+    assert "--curriculum is for networks" in refused(2, *forest, "--curriculum", "0.5")
+    assert "--correct-within is for networks" in refused(2, *forest, "--correct-within", "3")
+    assert not (tmp_path / "run").exists()
+
+
 def test_no_data_and_wrong_folders_are_sentences(tmp_path: Path, refused: Callable[..., str]) -> None:
     missing, empty = tmp_path / "missing", tmp_path / "empty"
     empty.mkdir()

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from datagen import DatasetError
 from datagen.sources.webdataset import ShardFrames
@@ -71,6 +73,39 @@ def test_schedule_takes_every_frame_once_a_pass_and_sources_by_weight() -> None:
         assert (np.sort(passes, axis=1) == np.arange(count)).all()
         assert not (passes == passes[0]).all()
     np.testing.assert_array_equal(schedule_draws(frames, 100, seed=5), schedule[:100])
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    length=st.sampled_from([450, 900, 1800]),
+    counts=st.lists(st.integers(1, 300), min_size=1, max_size=3),
+    seed=st.integers(0, 99),
+)
+def test_a_curriculum_adds_the_frames_in_their_order(length: int, counts: list[int], seed: int) -> None:
+    """No draw takes a frame further on than its ninth of the curriculum allows; afterwards all are taken."""
+    draws = 1800
+    sources: list[Source] = [Source([None] * count) for count in counts]  # type: ignore[list-item]
+    schedule = schedule_draws(sources, draws, seed, length / draws)
+    part = np.minimum(np.arange(draws) // (length // 9), 9)
+    for index, count in enumerate(counts):
+        allowed = np.ceil(count * (part + 1) / 10).astype(int)
+        own = schedule[:, 0] == index
+        for number in range(10):
+            seen, first = schedule[own & (part == number), 1], allowed[part == number].max(initial=1)
+            assert (seen < first).all()
+            assert len(np.unique(seen)) == min(len(seen), first)
+    np.testing.assert_array_equal(schedule[:, 0], schedule_draws(sources, draws, seed)[:, 0])
+
+
+def test_a_preset_with_a_curriculum_begins_with_the_first_frames(tmp_path: Path) -> None:
+    sources, _ = open_sources([(write_dataset(tmp_path, 3, train=10), 1.0)], (64, 64))
+    still = AugmentationConfig(log_zoom=(0, 0), log_squeeze=(0, 0), log_brightness=0, log_gamma=0)
+    preset = replace(PRESET, augmentation=still, curriculum=1.0)
+    first = StereoDataModule(sources, [], preset, 100, 0).block(0)
+    schedule = schedule_draws(sources, 200, 0, 1.0)
+    assert set(schedule[:10, 1]) == {0}
+    without = StereoDataModule(sources, [], replace(preset, curriculum=0.0), 100, 0).block(0)
+    assert not torch.equal(next(iter(first))["disparity"], next(iter(without))["disparity"])
 
 
 def test_shards_are_taken_a_few_at_a_time() -> None:

@@ -139,6 +139,8 @@ def test_features_are_conv1_upconv1_and_the_upsampled_prediction(network: DispNe
         raw = network.stage1.uppr(output.disparities[4])
     torch.testing.assert_close(output.features[:, :64], conv1)
     torch.testing.assert_close(output.features[:, 96:], raw)
+    assert output.decoded.shape[1] == 32
+    torch.testing.assert_close(network.stage1.iconv(output.features), output.decoded)
 
 
 def test_prediction_scale_multiplies_every_prediction() -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import nn
 
-from training.inference import regress, regress_consistently
+from training.inference import head_inputs, regress, regress_consistently
 from training.networks import (
     ConfNet,
     DispNetConfig,
@@ -19,6 +19,7 @@ from training.networks import (
     left_right_consistency,
     predict_right,
 )
+from training.networks.dispnet import FeatureKind
 from training.networks.evidence import (
     COST_OFFSETS_PX,
     EVIDENCE_CHANNELS,
@@ -154,4 +155,25 @@ def test_one_pass_gives_both_views() -> None:
         mirrored = predict_right(lambda a, b: regress(regressor, a, b).disparity, left, right)
     torch.testing.assert_close(regression.disparity, alone.disparity)
     torch.testing.assert_close(regression.features, alone.features)
+    torch.testing.assert_close(regression.decoded, alone.decoded)
     torch.testing.assert_close(consistency, left_right_consistency(alone.disparity, mirrored))
+
+
+@pytest.mark.parametrize("kind", ["joined", "decoded"])
+def test_heads_see_the_features_they_are_configured_for(kind: FeatureKind) -> None:
+    """Of a regressor whose finest decoder answers zero, one kind of features is zero and the other is not."""
+    torch.manual_seed(0)
+    regressor = DispNetCorr1D(DispNetConfig(width=0.25)).eval()
+    for parameter in regressor.stage1.iconv.parameters():
+        nn.init.zeros_(parameter)
+    config = HeadConfig(width=4, hidden=4, features=kind).on(regressor)
+    assert config.feature_channels == {"joined": 25, "decoded": 8}[kind]
+    confnet, gradnet = ConfNet(config), GradNet(config)
+    left, right = torch.rand(2, 1, 3, 64, 64)
+    with torch.no_grad():
+        seen = head_inputs(regressor, confnet, gradnet, left, right)
+        for features in (seen.confnet[1], seen.gradnet[1]):
+            assert features.shape == (1, config.feature_channels, 32, 32)
+            assert bool((features == 0).all()) == (kind == "decoded")
+        assert confnet(*seen.confnet).shape == (1, 2, 64, 64)
+        assert gradnet(*seen.gradnet).shape == (1, 2, 64, 64)

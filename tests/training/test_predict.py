@@ -29,7 +29,7 @@ def save_run(run: Path) -> tuple[DispNetCorr1D, ConfNet, GradNet]:
     regressor = DispNetCorr1D(CONFIG)
     regressor(torch.rand(2, 3, 64, 64), torch.rand(2, 3, 64, 64))  # moves BatchNorm's statistics
     save_weights(run, "regressor", regressor, SUMMARY)
-    head = HeadConfig(feature_channels=regressor.feature_channels, width=4, hidden=4)
+    head = HeadConfig(width=4, hidden=4).on(regressor)
     confnet, gradnet = ConfNet(replace(head, evidence=True)), GradNet(head)
     confnet.standardize(torch.rand(len(confnet.input_mean)), torch.rand(len(confnet.input_mean)) + 0.5)
     digest = load_regressor(run).sha256

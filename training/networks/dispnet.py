@@ -19,6 +19,8 @@ STRIDE = 64
 """Input sides must be multiples of this."""
 
 Normalization = Literal["none", "batch"]
+FeatureKind = Literal["joined", "decoded"]
+"""What "the last concatenated matching features" are: iconv1's input, as the words say, or its output."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class DispNetOutput(NamedTuple):
     features: Tensor
     """The last concatenated matching features, (B, F, H/2, W/2), F = 97 at full width: conv1 of the left view,
     upconv1, and as the last channel pr2 upsampled, in pixels."""
+    decoded: Tensor
+    """What the finest prediction is made of: iconv1's answer to `features`, (B, 32 at full width, H/2, W/2)."""
 
 
 def scaled(channels: int, width: float) -> int:
@@ -135,7 +139,7 @@ class DispNetCorr1D(nn.Module):
         self.stage3 = ExpandingStage(c256, c256, c128, config)
         self.stage2 = ExpandingStage(c128, c128, c64, config)
         self.stage1 = ExpandingStage(c64, c64, c32, config)
-        self.feature_channels = c64 + c32 + 1
+        self.feature_channels: dict[FeatureKind, int] = {"joined": c64 + c32 + 1, "decoded": c32}
         self.register_buffer("image_mean", torch.full((3,), 0.4))
         initialize(self)
 
@@ -181,6 +185,7 @@ class DispNetCorr1D(nn.Module):
         return DispNetOutput(
             disparities=tuple(scale * p for p in predictions),
             features=torch.cat([joined[:, :-1], scale * joined[:, -1:]], dim=1),
+            decoded=features,
         )
 
 

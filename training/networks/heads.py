@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
-from training.networks.dispnet import LEAKY_SLOPE, Normalization
+from training.networks.dispnet import LEAKY_SLOPE, DispNetCorr1D, FeatureKind, Normalization
 
 Activation = Literal["relu", "leaky_relu"]
 
@@ -20,6 +20,8 @@ class HeadConfig:
 
     feature_channels: int = 97
     """Channels of the regressor's matching features."""
+    features: FeatureKind = "joined"
+    """Which features: `joined`, as the paper's words say (97 at full width), or `decoded`, which are 32."""
     width: int = 64
     """Channels of the four 3x3 convolutions (ours)."""
     hidden: int = 128
@@ -36,6 +38,10 @@ class HeadConfig:
     surroundings already; a disparity's own have not (ours)."""
     evidence: bool = False
     """Also see what the pair and the disparity itself say, `training.networks.evidence` (ours)."""
+
+    def on(self, regressor: DispNetCorr1D) -> HeadConfig:
+        """The same for as many channels as this regressor's features have."""
+        return replace(self, feature_channels=regressor.feature_channels[self.features])
 
 
 class PixelHead(nn.Module):
