@@ -34,6 +34,16 @@ def test_exact_form_minimises_the_energy(style, solver):
     assert solution.info.solver == solver
 
 
+@pytest.mark.parametrize("shape", [(12, 31), (31, 12), (1, 9), (9, 1)])
+def test_a_band_and_superlu_factorise_the_same_matrix(shape, monkeypatch):
+    """What is too large for a band goes to SuperLU, with the same answer."""
+    problem = random_problem(*shape, seed=6, style="mixed")
+    banded = solve_mrf(*problem.inputs, solver="direct").disparity
+    monkeypatch.setattr("refine.solvers.direct.BAND_ENTRIES", 0)
+    monkeypatch.setattr("refine.solvers.direct.cholesky_banded", None)
+    np.testing.assert_allclose(solve_mrf(*problem.inputs, solver="direct").disparity, banded, atol=1e-9)
+
+
 @pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize("solver", ["direct", "cg", "multigrid"])
 def test_paper_form_solves_equation_8(style, solver):
