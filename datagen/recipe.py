@@ -48,7 +48,8 @@ class Recipe:
     assets: AssetPool = field(default_factory=AssetPool)
     """The user's own files; each belongs to one split only."""
     curriculum_scenes: int = 0
-    """Over so many scenes of each split the worlds grow from few and simple to the family's own; 0 for none."""
+    """Over so many scenes of the train split the worlds grow from few and simple to the family's own; 0 for none. What
+    is validated and tested on is the family's own from the first scene."""
     curation: Curation = field(default_factory=Curation)
     disparities: DisparityHistogram | None = field(default=None, metadata=OMIT_DEFAULT)
     """How the disparities of all scenes together shall be spread; None for whatever the family gives."""
@@ -120,7 +121,7 @@ class Recipe:
         key = (SPLITS.index(split), index) + ((attempt,) if attempt else ())
         sequence = np.random.SeedSequence(self.seed, spawn_key=key)
         world = self.world
-        if index < self.curriculum_scenes:
+        if split == "train" and index < self.curriculum_scenes:
             world = world.at_complexity(index / self.curriculum_scenes)
         wanted = self.curation.disparity_px
         world = world.within_disparities(*wanted) if wanted else world

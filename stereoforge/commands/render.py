@@ -91,7 +91,7 @@ class Render:
     """How many pixels of surfaces shall have which disparity over all scenes together, such as
     2-20:30,20-60:50,60-120:20: ranges in pixels and their weights, met by choosing depths and baseline."""
     curriculum: Annotated[int | None, shown("N", 0)] = None
-    """Over the first N scenes of the split the worlds grow from a tenth of their things to all of them."""
+    """Over the first N scenes of the train split the worlds grow from a tenth of their things to all of them."""
     dry_run: bool = False
     """Say what would be rendered, how long it would take and how much disk, measured on one frame of one
     scene; nothing is written."""

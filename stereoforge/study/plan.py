@@ -35,6 +35,10 @@ class DomainPlan:
     study's."""
     scenes: dict[str, int] = field(default_factory=lambda: {"train": 100, "val": 5, "test": 25})
     """Scenes of each split; those of the training splits are rendered only where something is trained on them."""
+    curriculum_scenes: int = 0
+    """How many of the training scenes that are rendered grow from few and simple things to the domain's own."""
+    curriculum: float = 0.0
+    """Share of its steps over which the regressor sees them in that order, a growing part of all."""
     steps: dict[str, int] = field(default_factory=dict)
     """Training steps of each network; the preset's where none are given."""
     methods: tuple[str, ...] = ()
@@ -89,6 +93,11 @@ class StudyPlan:
                 )
             if min((*domain.scenes.values(), *domain.steps.values()), default=1) < 1:
                 raise UsageError(f"{name}: numbers of scenes and steps must be at least 1")
+            if domain.curriculum_scenes < 0 or not 0 <= domain.curriculum <= 1:
+                raise UsageError(
+                    f"{name}: curriculum_scenes must not be negative, and curriculum a share from 0 to 1; got "
+                    f"{domain.curriculum_scenes} and {domain.curriculum:g}"
+                )
         if min(self.fine_tuning_steps, self.tuning_frames, self.seed) < 0:
             raise UsageError("fine_tuning_steps, tuning_frames and the seed must not be negative")
         find_preset("regressor", self.preset)
@@ -109,16 +118,25 @@ class StudyPlan:
     def recipe(self, name: str, splits: tuple[str, ...]) -> Recipe:
         """What to render of a domain for training or for testing. Raises DatasetError for a wrong config."""
         scenes = {split: self.domains[name].scenes.get(split, 0) for split in splits}
-        return self._recipe(name, scenes, self.domains[name].config)
+        ramp = self.domains[name].curriculum_scenes if "train" in splits else 0
+        return self._recipe(name, scenes, self.domains[name].config, ramp)
 
     def tuning_recipe(self, name: str) -> Recipe:
         """What to render of a domain for choosing parameters: one frame of each validation scene."""
         return self._recipe(name, {"val": self.tuning_frames}, {**self.domains[name].config, "frames": 1})
 
-    def _recipe(self, name: str, scenes: dict[str, int], config: dict[str, Any]) -> Recipe:
+    def _recipe(
+        self, name: str, scenes: dict[str, int], config: dict[str, Any], curriculum_scenes: int = 0
+    ) -> Recipe:
         width, height = self.size
         world = {"family": name, **_sized(config, width, height)}
-        plain = {"world": world, "scenes": scenes, "seed": self.seed, "samples": self.samples}
+        plain = {
+            "world": world,
+            "scenes": scenes,
+            "seed": self.seed,
+            "samples": self.samples,
+            "curriculum_scenes": curriculum_scenes,
+        }
         return recipe_from_plain(plain, f"the domain {name}")
 
     def plain(self) -> dict[str, Any]:

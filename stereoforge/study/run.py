@@ -33,7 +33,7 @@ from stereoforge.tuning import VALIDATION, Tuning, validation_frames
 from stereoforge.tuning import describe as describe_tuning
 from storage import write_bytes
 from training.model_card import write_model_card
-from training.presets import Preset, find_preset
+from training.presets import Preset, change_preset, find_preset
 from training.train import train
 
 PANELS = EvaluationOptions(first_panels=2, worst_panels=1)
@@ -217,6 +217,8 @@ class _Study:
 
     def _training_job(self, name: str, task: str, domain: str, steps: int | None, init: Job | None) -> Job:
         preset = self.presets.get(task) or find_preset(task, self.plan.preset)
+        changes = {"curriculum": self.plan.domains[domain].curriculum} if task == "regressor" else {}
+        preset = change_preset(preset, changes)
         data = self.training_data[domain]
         steps = preset.steps if steps is None else steps
         settings = {
@@ -234,6 +236,7 @@ class _Study:
                 [(data.source, 1.0)],
                 folder,
                 self.presets.get(task, self.plan.preset),
+                changes={name: value for name, value in changes.items() if value},
                 init=init.folder if init else None,
                 resume=True,
                 steps=steps,

@@ -95,8 +95,11 @@ def test_a_curriculum_goes_from_few_and_plain_to_the_family_s_own() -> None:
         for scene, count in zip(scenes, flying, strict=True)
     ]
     assert plain[0] == 1 > plain[2]
-    # Scenes after the ramp are those of the recipe without one, whatever the set's size.
-    assert scenes[2] == replace(recipe, curriculum_scenes=0).sample("train", 8)
+    # Scenes after the ramp are those of the recipe without one, whatever the set's size, and so are all that are
+    # validated and tested on.
+    without = replace(recipe, curriculum_scenes=0)
+    assert scenes[2] == without.sample("train", 8)
+    assert all(recipe.sample(split, 0) == without.sample(split, 0) for split in ("val", "test"))
 
 
 @pytest.mark.parametrize("family", ["driving", "monkaa", "sintel"])

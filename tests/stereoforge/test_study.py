@@ -47,7 +47,13 @@ def tiny_presets() -> dict[str, Preset]:
 
 def tiny_plan(**changes: Any) -> StudyPlan:
     names = [name for name in ("flying_things", "driving") if name in FAMILIES]
-    domain = DomainPlan(config={"frames": 1}, scenes={"train": 1, "val": 1, "test": 2}, steps=STEPS)
+    domain = DomainPlan(
+        config={"frames": 1},
+        scenes={"train": 1, "val": 1, "test": 2},
+        curriculum_scenes=1,
+        curriculum=0.5,
+        steps=STEPS,
+    )
     plan = StudyPlan(
         domains=dict.fromkeys(names, domain),
         train=tuple(names),
@@ -126,6 +132,25 @@ def test_a_plan_survives_its_file(tmp_path: Path) -> None:
     assert read_plan(path) == plan
 
 
+def test_only_what_is_trained_on_grows_from_simple_to_complex(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = tiny_plan()
+    assert plan.recipe("driving", ("train", "val")).curriculum_scenes == 1
+    assert plan.recipe("driving", ("test",)).curriculum_scenes == 0
+    assert plan.tuning_recipe("driving").curriculum_scenes == 0
+    asked: list[Job] = []
+    monkeypatch.setattr("stereoforge.study.run.run_jobs", asked.extend)
+    with pytest.raises(ValueError, match="not a whole evaluation"):  # nothing was run
+        run_study(plan, tmp_path)
+    shares = {
+        job.settings["task"]: job.settings["preset"]["curriculum"]
+        for job in asked
+        if "preset" in job.settings
+    }
+    assert shares == {"regressor": 0.5, "regressor_f": 0.0, "confnet": 0.0, "gradnet": 0.0}
+
+
 def test_the_shipped_plan_can_be_rendered() -> None:
     plan = read_plan(Path(__file__).parents[2] / "recipes" / "study.yaml")
     for name in plan.test:
@@ -165,6 +190,8 @@ def test_the_fine_tuned_rival_is_trained_only_to_be_compared(
         ({"domains": {"swimming": DomainPlan()}, "train": ("swimming",), "test": ("swimming",)}, "no family"),
         ({"methods": ("magic",)}, "no method 'magic'"),
         ({"tuning_frames": -1}, "must not be negative"),
+        ({"domains": dict.fromkeys(FAMILIES, DomainPlan(curriculum=1.5))}, "to 1; got 0 and 1.5"),
+        ({"domains": dict.fromkeys(FAMILIES, DomainPlan(curriculum_scenes=-1))}, "must not be negative"),
         ({"test": ("flying_things", "flying_things")}, "named twice"),
     ],
 )
