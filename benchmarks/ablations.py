@@ -46,6 +46,7 @@ from training.weights import has_weights
 
 FINEST_ONLY = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 EVEN = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+UNDILATED = (1, 1, 1, 1)
 
 
 def _staged(steps: int) -> dict[str, Any]:
@@ -104,6 +105,7 @@ def heads(base: ConfNetPreset | GradNetPreset, dropouts: dict[str, float]) -> di
         **{name: {"dropout": value} for name, value in dropouts.items()},
         "no normalisation": {"normalization": "none"},
         "dilations 1, 2, 4, 4": {"dilations": (1, 2, 4, 4)},
+        "dilations 1": {"dilations": UNDILATED},
         "width 64": {"width": 64, "hidden": 128},
         "32 features": {"features": "decoded"},
     }
@@ -113,12 +115,10 @@ def heads(base: ConfNetPreset | GradNetPreset, dropouts: dict[str, float]) -> di
 
 def confnets() -> dict[str, Preset]:
     base = SMALL_CONFNET
-    narrow = replace(base.network, dilations=(1, 1, 1, 1))
     return {
         **heads(base, {"dropout 0.5": 0.5, "no dropout": 0.0}),
-        "dilations 1": replace(base, network=narrow),
         "no evidence": replace(base, network=replace(base.network, evidence=False)),
-        "neither": replace(base, network=replace(narrow, evidence=False)),
+        "neither": replace(base, network=replace(base.network, dilations=UNDILATED, evidence=False)),
         **{
             f"labels within {threshold:g} px": replace(base, correct_within_px=threshold)
             for threshold in (0.5, 2.0, 3.0)

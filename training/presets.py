@@ -4,9 +4,9 @@
 parameters, a 11 MB file) and `tiny` (for minutes on a laptop's CPU) change what short runs on few pairs need
 changed, all of it here: BatchNorm, a one-sided correlation, predictions in units of 16 px, a larger learning rate
 with warm-up and a cosine end, gradient clipping, a compressed loss schedule, milder colour changes, flips, heads
-that work at the features' half resolution, look further around (dilations) and also see matching costs around the
-disparity, how the disparity lies in its surroundings and, for GradNet, their slopes (`training.networks.evidence`),
-since the features of a small regressor hold too little of these; and, in `small`, some of the heads' crops are sheared
+that work at the features' half resolution and also see matching costs around the disparity, how the disparity lies in
+its surroundings and, for GradNet, their slopes (`training.networks.evidence`), since the features of a small regressor
+hold too little of these; and, in `small`, look further around (dilations), and some of the heads' crops are sheared
 into slants (docs/ablations.md).
 """
 
@@ -267,9 +267,11 @@ TINY_CONFNET = replace(
     steps=200,
     augmentation=SMALL_AUGMENTATION,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=20),
+    network=replace(SMALL_CONFNET.network, dilations=(1, 1, 1, 1)),
     validation_interval=100,
     validation_samples=16,
 )
+"""So short a run learns more where it looks next to a pixel than further around (docs/ablations.md)."""
 
 FULL_GRADNET = GradNetPreset(
     steps=200_000,
@@ -296,6 +298,7 @@ TINY_GRADNET = replace(
     steps=200,
     augmentation=SMALL_AUGMENTATION,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=20),
+    network=replace(SMALL_GRADNET.network, dilations=(1, 1, 1, 1)),
     validation_interval=100,
     validation_samples=16,
 )

@@ -69,6 +69,8 @@ def test_full_heads() -> None:
     )
     assert gradnet.optimizer.halve_at == tuple(range(20_000, 200_000, 20_000))
     assert confnet.network == HeadConfig(97, 64, 128, 0.5, "none", False)
+    assert confnet.network.features == "joined"
+    assert {preset.curriculum for preset in (full_regressor(), fine_tuning, confnet, gradnet)} == {0.0}
     assert gradnet.network == HeadConfig(97, 64, 128, 0.2, "none", False)
     assert (confnet.correct_within_px, gradnet.gradient_threshold_px) == (1.0, 1.0)
     assert fine_tuning.gradient_weight == 5.0

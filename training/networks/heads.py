@@ -20,8 +20,6 @@ class HeadConfig:
 
     feature_channels: int = 97
     """Channels of the regressor's matching features."""
-    features: FeatureKind = "joined"
-    """Which features: `joined`, as the paper's words say (97 at full width), or `decoded`, which are 32."""
     width: int = 64
     """Channels of the four 3x3 convolutions (ours)."""
     hidden: int = 128
@@ -38,6 +36,8 @@ class HeadConfig:
     surroundings already; a disparity's own have not (ours)."""
     evidence: bool = False
     """Also see what the pair and the disparity itself say, `training.networks.evidence` (ours)."""
+    features: FeatureKind = "joined"
+    """Which features: `joined`, as the paper's words say (97 at full width), or `decoded`, which are 32."""
 
     def on(self, regressor: DispNetCorr1D) -> HeadConfig:
         """The same for as many channels as this regressor's features have."""
