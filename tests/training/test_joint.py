@@ -46,7 +46,9 @@ class GivenTask(JointTask):
     def inputs(self, batch: Batch) -> HeadInputs:
         seen = batch["left"], batch["features"]
         return HeadInputs(
-            Regression(batch["initial"], batch["features"]), (*seen, batch["consistency"]), seen
+            Regression(batch["initial"], batch["features"], batch["features"]),
+            (*seen, batch["consistency"]),
+            seen,
         )
 
 
@@ -79,7 +81,7 @@ def joint(**changes: object) -> JointPreset:
 
 
 def refined(task: JointTask, batch: Batch) -> Tensor:
-    (disparity, _), confnet_sees, gradnet_sees = task.inputs(batch)
+    (disparity, *_), confnet_sees, gradnet_sees = task.inputs(batch)
     logits, gradient = task.network.confnet(*confnet_sees), task.network.gradnet(*gradnet_sees)
     return task.refine(batch["left"], disparity, logits, gradient)
 
@@ -90,7 +92,7 @@ def test_refines_as_the_method_does(form: str) -> None:
     ours = Ours(MRFParameters(30.0, 1.0, 4.0), ConfidenceShape(0.7, 2.0), form=form)  # type: ignore[arg-type]
     task, batch = GivenTask(joint(tolerance=1e-7), ours), given_batch(1)
     batch["left"] = (batch["left"] * 255).round() / 255
-    (disparity, _), confnet_sees, gradnet_sees = task.inputs(batch)
+    (disparity, *_), confnet_sees, gradnet_sees = task.inputs(batch)
     with torch.no_grad():
         got = refined(task, batch)[0, 0]
         confidence = task.network.confnet.confidence(*confnet_sees)[0, 0].numpy()

@@ -20,6 +20,7 @@ from tests.training.synthetic import random_pair, write_dataset
 from training.augmentation import NO_AUGMENTATION
 from training.data import check_sizes
 from training.errors import TrainingError
+from training.hardware import Precision
 from training.networks import DispNetConfig
 from training.predict import StereoPredictor
 from training.presets import Preset, RegressorPreset, find_preset
@@ -226,12 +227,17 @@ def test_a_moving_average_is_what_is_kept(data: Path, tmp_path: Path) -> None:
 
 
 def test_mixed_precision_is_nearly_the_same_run(data: Path, tmp_path: Path) -> None:
-    """bf16 holds three digits: the first loss is that of 32 bits to one percent, and not exactly."""
-    presets = {name: quick_regressor(validation_interval=10) for name in ("32", "bf16")}
-    for name, preset in presets.items():
-        train("regressor", [(data, 1.0)], tmp_path / name, preset, steps=10, precision=name, progress=False)  # type: ignore[arg-type]
-    losses = [scalars(tmp_path / name, "regressor", "train/loss")[9] for name in presets]
-    assert losses[0] == pytest.approx(losses[1], rel=0.03)
+    """bf16 holds three digits: the loss of weights that hardly move is that of 32 bits to one percent, and not exactly.
+
+    Ten steps at a usual rate carry the last digits' differences to 4 % on a processor without bf16 instructions.
+    """
+    preset = quick_regressor(validation_interval=10)
+    preset = replace(preset, optimizer=replace(preset.optimizer, learning_rate=1e-9))
+    names: tuple[Precision, ...] = ("32", "bf16")
+    for name in names:
+        train("regressor", [(data, 1.0)], tmp_path / name, preset, steps=10, precision=name, progress=False)
+    losses = [scalars(tmp_path / name, "regressor", "train/loss")[9] for name in names]
+    assert losses[0] == pytest.approx(losses[1], rel=0.01)
     assert losses[0] != losses[1]
     stored = weights(tmp_path / "bf16", "regressor")
     assert all(tensor.dtype in (torch.float32, torch.int64) for tensor in stored.values())
