@@ -102,7 +102,8 @@ class PlaneOracle(nn.Module):
         x = (torch.arange(left.shape[-1]) + 0.5) / stretch_x
         y = (torch.arange(left.shape[-2])[:, None] + 0.5) / stretch_y
         disparity = stretch_x * (a + b * x + c * y)
-        return DispNetOutput((disparity[None, None],), torch.zeros(1, 1, 2, 2))
+        features = torch.zeros(1, 1, 2, 2)
+        return DispNetOutput((disparity[None, None],), features, features)
 
 
 class SlopeOracle(PlaneOracle):
