@@ -109,6 +109,8 @@ class PlaneOracle(nn.Module):
 class SlopeOracle(PlaneOracle):
     """Stands for a GradNet: the slopes of that plane in pixels of the input it gets."""
 
+    config = HeadConfig()
+
     def inputs(self, features: Tensor, evidence: Evidence) -> tuple[Tensor, ...]:
         assert evidence.right.shape == evidence.left.shape
         assert evidence.disparity.shape == (1, 1, *evidence.left.shape[-2:])
