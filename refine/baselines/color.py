@@ -60,7 +60,7 @@ class Color(Method):
         # With alpha = 0 the gradient counts for nothing, whatever it is.
         level = np.zeros((*frame.disparity.shape, 2), np.float32)
         # The multigrid cycle is made for the gradient term's couplings; without them it takes hundreds of iterations,
-        # and a factorisation of a smaller image 0.4 of their time.
+        # and a factorisation of a smaller image less than half of their time.
         solver: SolverName = "direct" if frame.disparity.size <= _DIRECT_UP_TO_PIXELS else "auto"
         method = Ours(parameters, self.shape, self.form, solver, self.tolerance)
         return method.run(replace(frame, gradient=level))

@@ -217,7 +217,8 @@ class _Study:
 
     def _training_job(self, name: str, task: str, domain: str, steps: int | None, init: Job | None) -> Job:
         preset = self.presets.get(task) or find_preset(task, self.plan.preset)
-        changes = {"curriculum": self.plan.domains[domain].curriculum} if task == "regressor" else {}
+        curriculum = self.plan.domains[domain].curriculum
+        changes = {"curriculum": curriculum} if curriculum and task == "regressor" else {}
         preset = change_preset(preset, changes)
         data = self.training_data[domain]
         steps = preset.steps if steps is None else steps
@@ -236,7 +237,7 @@ class _Study:
                 [(data.source, 1.0)],
                 folder,
                 self.presets.get(task, self.plan.preset),
-                changes={name: value for name, value in changes.items() if value},
+                changes=changes,
                 init=init.folder if init else None,
                 resume=True,
                 steps=steps,
