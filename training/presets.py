@@ -6,8 +6,7 @@ changed, all of it here: BatchNorm, a one-sided correlation, predictions in unit
 with warm-up and a cosine end, gradient clipping, a compressed loss schedule, milder colour changes, flips, heads
 that work at the features' half resolution and also see matching costs around the disparity, how the disparity lies in
 its surroundings and, for GradNet, their slopes (`training.networks.evidence`), since the features of a small regressor
-hold too little of these; and, in `small`, look further around (dilations), and some of the heads' crops are sheared
-into slants (docs/ablations.md).
+hold too little of these; and, in `small`, some of the heads' crops are sheared into slants (docs/ablations.md).
 """
 
 from __future__ import annotations
@@ -242,8 +241,6 @@ FULL_CONFNET = ConfNetPreset(
     ),
     validation_interval=10_000,
 )
-WIDE_DILATIONS = (1, 2, 4, 8)
-"""With half resolution a reach of 30 pixels to every side."""
 SMALL_CONFNET = ConfNetPreset(
     steps=5000,
     batch_size=4,
@@ -257,7 +254,6 @@ SMALL_CONFNET = ConfNetPreset(
         dropout=0.2,
         normalization="batch",
         half_resolution=True,
-        dilations=WIDE_DILATIONS,
         evidence=True,
     ),
     validation_interval=500,
@@ -267,11 +263,9 @@ TINY_CONFNET = replace(
     steps=200,
     augmentation=SMALL_AUGMENTATION,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=20),
-    network=replace(SMALL_CONFNET.network, dilations=(1, 1, 1, 1)),
     validation_interval=100,
     validation_samples=16,
 )
-"""So short a run learns more where it looks next to a pixel than further around (docs/ablations.md)."""
 
 FULL_GRADNET = GradNetPreset(
     steps=200_000,
@@ -298,11 +292,12 @@ TINY_GRADNET = replace(
     steps=200,
     augmentation=SMALL_AUGMENTATION,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=20),
-    network=replace(SMALL_GRADNET.network, dilations=(1, 1, 1, 1)),
     validation_interval=100,
     validation_samples=16,
 )
 
+WIDE_DILATIONS = (1, 2, 4, 8)
+"""With half resolution a reach of 30 pixels to every side."""
 SMALL_FREE_CONFNET = FreeConfNetPreset(
     steps=SMALL_CONFNET.steps,
     batch_size=4,
@@ -310,7 +305,7 @@ SMALL_FREE_CONFNET = FreeConfNetPreset(
     crop_height=128,
     optimizer=SMALL_CONFNET.optimizer,
     augmentation=SLANTED_AUGMENTATION,
-    network=replace(SMALL_CONFNET.network, feature_channels=FREE_FEATURES),
+    network=replace(SMALL_CONFNET.network, feature_channels=FREE_FEATURES, dilations=WIDE_DILATIONS),
     validation_interval=500,
 )
 TINY_FREE_CONFNET = replace(
@@ -328,7 +323,7 @@ SMALL_FREE_GRADNET = FreeGradNetPreset(
     crop_height=128,
     optimizer=SMALL_GRADNET.optimizer,
     augmentation=SLANTED_AUGMENTATION,
-    network=replace(SMALL_GRADNET.network, feature_channels=FREE_FEATURES),
+    network=replace(SMALL_GRADNET.network, feature_channels=FREE_FEATURES, dilations=WIDE_DILATIONS),
     validation_interval=500,
 )
 TINY_FREE_GRADNET = replace(
