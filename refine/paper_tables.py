@@ -1,4 +1,5 @@
-"""Tables 1-6 of the paper for one data set: our numbers, their confidence, and what the paper prints.
+"""Tables 1-6 of the paper for one data set: our numbers, their confidence, and what the paper prints. Methods that the
+paper does not have end Tables 2, 4 and 6.
 
 The paper's absolute numbers are of other data and a larger network, so beside each stands the ratio to its own
 regressor's, here and there.
@@ -7,7 +8,7 @@ regressor's, here and there.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from refine.bootstrap import REFERENCE, UNKNOWN, Bootstrap, Interval, bootstrap
@@ -15,6 +16,8 @@ from refine.paper import KITTI_OTHERS, NAN, PAPER, PaperScore, counterpart
 from refine.results import EvaluatedSet
 
 MAIN_ROWS = ("regressor", "wmf", "regressor_f", "ours")
+REFINEMENT_ROWS = ("color", "tgv", "fbs", "grad", "ours")
+PAPER_ROWS = {*MAIN_ROWS, *REFINEMENT_ROWS, "gradnet", "ours_conf_gt"}
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,14 @@ class _Layout:
     columns: tuple[MeasureColumn, ...]
     compares: bool = True
     """Whether it says nothing about one method alone."""
+    others: bool = False
+    """Whether methods that no table of the paper has end this one."""
+
+    def rows(self, evaluated: Iterable[str]) -> tuple[str, ...]:
+        """Those of the evaluated methods that it shows, in order."""
+        names = list(evaluated)
+        others = (name for name in names if self.others and name not in PAPER_ROWS)
+        return (*(name for name in self.methods if name in names), *others)
 
 
 def _layouts(threshold: float) -> tuple[_Layout, ...]:
@@ -103,6 +114,7 @@ def _layouts(threshold: float) -> tuple[_Layout, ...]:
                 epe_all,
             ),
             compares=False,
+            others=True,
         ),
         _Layout(
             3,
@@ -110,23 +122,24 @@ def _layouts(threshold: float) -> tuple[_Layout, ...]:
             (*MAIN_ROWS, "ours_conf_gt"),
             (bad_all, epe_all),
         ),
-        _Layout(4, "Gradient error of the disparity after refinement", MAIN_ROWS, (gradient,)),
+        _Layout(4, "Gradient error of the disparity after refinement", MAIN_ROWS, (gradient,), others=True),
         _Layout(
             5,
             "Ways to refine",
-            ("color", "tgv", "fbs", "grad", "ours"),
+            REFINEMENT_ROWS,
             (epe_all, bad_all, gradient, MeasureColumn("seconds", "s a frame", compared=False)),
         ),
         _Layout(
             6,
             "KITTI outliers (> 3 px and > 5 %)",
-            ("regressor", "wmf", "regressor_f", "ours", "ours_conf_gt"),
+            (*MAIN_ROWS, "ours_conf_gt"),
             (
                 MeasureColumn("d1_bg", "D1 background, %", 100),
                 MeasureColumn("d1_fg", "D1 foreground, %", 100),
                 MeasureColumn("d1_all", "D1 all, %", 100),
             ),
             compares=False,
+            others=True,
         ),
     )
 
@@ -143,7 +156,7 @@ def paper_tables(each: EvaluatedSet, resamples: Bootstrap | None = None) -> tupl
         _table(each, known, layout)
         for layout in _layouts(each.evaluation.options.bad_threshold)
         if (layout.number != 6 or each.is_kitti)
-        and sum(name in each.evaluation.scores for name in layout.methods) >= 1 + layout.compares
+        and len(layout.rows(each.evaluation.scores)) >= 1 + layout.compares
     )
 
 
@@ -158,8 +171,7 @@ def _table(each: EvaluatedSet, known: Bootstrap, layout: _Layout) -> PaperTable:
             tuple(_cell(each, known, printed, method, column) for column in layout.columns),
             method in evaluation.upper_bounds,
         )
-        for method in layout.methods
-        if method in evaluation.scores
+        for method in layout.rows(evaluation.scores)
     ]
     if layout.number == 6 and beside == "KITTI 2015":
         for label, score in KITTI_OTHERS.items():

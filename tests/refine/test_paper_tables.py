@@ -6,11 +6,13 @@ import csv
 import json
 import math
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from refine.archive import read_evaluation, write_evaluation
+from refine.baselines.wmf import WMF
 from refine.bootstrap import bootstrap
 from refine.evaluation import EvaluationFrame, evaluate
 from refine.methods import default_methods
@@ -103,6 +105,23 @@ def test_tables_hold_our_numbers_the_papers_and_both_ratios(evaluated: Evaluated
     assert math.isnan(fifth["ours"][3].ratio)
     bound = tables[3].rows[-1]
     assert (bound.method, bound.upper_bound) == ("ours_conf_gt", True)
+
+
+class OwnMedian(WMF):
+    name: ClassVar[str] = "own_median"
+    label: ClassVar[str] = "A median of my own"
+
+
+def test_methods_that_the_paper_does_not_have_end_the_tables_of_disparities() -> None:
+    rows = (*default_methods(("regressor",)), OwnMedian(radius_px=2))
+    evaluation = evaluate(frames(2), rows)
+    tables = {table.number: table for table in paper_tables(EvaluatedSet("toys", evaluation, "kitti2015"))}
+    assert list(tables) == [2, 4, 6]
+    for table in tables.values():
+        assert [row.label for row in table.rows if row.method] == ["Regressor", "A median of my own"]
+    own = tables[2].rows[1].cells[3]
+    assert own.value == evaluation.scores["own_median"].regions["all"].epe
+    assert math.isnan(own.paper)
 
 
 def test_kittis_table_tells_cars_from_the_rest(kitti: EvaluatedSet) -> None:
