@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import shutil
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -42,11 +41,10 @@ from training.presets import (
     RegressorPreset,
 )
 from training.train import train
-from training.weights import has_weights
+from training.weights import copy_weights, has_weights
 
 FINEST_ONLY = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 EVEN = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-UNDILATED = (1, 1, 1, 1)
 
 
 def _staged(steps: int) -> dict[str, Any]:
@@ -105,7 +103,7 @@ def heads(base: ConfNetPreset | GradNetPreset, dropouts: dict[str, float]) -> di
         **{name: {"dropout": value} for name, value in dropouts.items()},
         "no normalisation": {"normalization": "none"},
         "dilations 1, 2, 4, 4": {"dilations": (1, 2, 4, 4)},
-        "dilations 1": {"dilations": UNDILATED},
+        "dilations 1, 2, 4, 8": {"dilations": (1, 2, 4, 8)},
         "width 64": {"width": 64, "hidden": 128},
         "32 features": {"features": "decoded"},
     }
@@ -118,7 +116,6 @@ def confnets() -> dict[str, Preset]:
     return {
         **heads(base, {"dropout 0.5": 0.5, "no dropout": 0.0}),
         "no evidence": replace(base, network=replace(base.network, evidence=False)),
-        "neither": replace(base, network=replace(base.network, dilations=UNDILATED, evidence=False)),
         **{
             f"labels within {threshold:g} px": replace(base, correct_within_px=threshold)
             for threshold in (0.5, 2.0, 3.0)
@@ -168,8 +165,7 @@ def run(task: str, name: str, preset: Preset, options: argparse.Namespace) -> No
 def judge(run: Path, source: Path, data: Path) -> dict[str, float]:
     """Of a ConfNet on the validation frames, whatever it took as correct: areas under the sparsification curve, and the
     errors of the refinement with the other networks and the parameters of `source`."""
-    for name in ("gradnet.safetensors", "gradnet.json"):
-        shutil.copy(source / name, run / name)
+    copy_weights(source, run, "gradnet")
     predictors = open_predictors(run, "cpu")
     frames = [predictors.frame(sample) for sample in open_source(data).held_out_frames()]
     refined = measure(open_settings(None, source).ours, frames)

@@ -123,8 +123,9 @@ def read_summary(run: Path, task: str) -> TrainingSummary:
 
 
 def copy_weights(source: Path, target: Path, task: str) -> None:
-    """Copy a network, intact, from one run folder to another."""
-    load_regressor(source, task)
+    """Copy a network, intact, from one run folder to another. Raises TrainingError, naming what is wrong."""
+    loaders = {"regressor": load_regressor, "confnet": load_confnet, "gradnet": load_gradnet}
+    loaders[task.split("_")[0]](source, task)
     for path in (weights_path(source, task), source / f"{task}.json"):
         write_bytes(target / path.name, path.read_bytes())
 

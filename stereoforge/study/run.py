@@ -35,6 +35,7 @@ from storage import write_bytes
 from training.model_card import write_model_card
 from training.presets import Preset, change_preset, find_preset
 from training.train import train
+from training.weights import copy_weights
 
 PANELS = EvaluationOptions(first_panels=2, worst_panels=1)
 """Fewer pictures than `evaluate` shows: there are many sets."""
@@ -73,6 +74,8 @@ def run_study(
     )
 
 
+FOREST = "rdf"
+"""The random forest among a domain's networks."""
 STATISTICS = "statistics.json"
 
 
@@ -189,7 +192,7 @@ class _Study:
             steps = self.plan.domains[name].steps.get(task)
             jobs[task] = self._training_job(name, task, name, steps, jobs.get("regressor"))
         if self.plan.forest and name == self.plan.subject:
-            jobs["rdf"] = self._forest_job(name, jobs["regressor"])
+            jobs[FOREST] = self._forest_job(name, jobs["regressor"])
         return jobs
 
     def _compares_fine_tuning(self, name: str) -> bool:
@@ -200,7 +203,7 @@ class _Study:
         data, forest = self.training_data[name], PLANS[self.plan.preset]
 
         def run(folder: Path) -> None:
-            _copy(regressor.folder, folder, "regressor")
+            copy_weights(regressor.folder, folder, "regressor")
             forest_file(folder).unlink(missing_ok=True)  # of a run that was stopped before it said so
             train_forest([data.source], folder, forest, self.plan.seed, self.device)
 
@@ -212,7 +215,7 @@ class _Study:
         }
         seconds = forest.frames * FRAME_SECONDS[False]
         return make_job(
-            self.out / "networks", f"{name}-rdf", f"growing the forest on {name}", settings, seconds, run
+            self.out / "networks", f"{name}-{FOREST}", f"growing the forest on {name}", settings, seconds, run
         )
 
     def _training_job(self, name: str, task: str, domain: str, steps: int | None, init: Job | None) -> Job:
@@ -369,15 +372,11 @@ DATASET = "set"
 def _collect(networks: Mapping[str, Job], folder: Path) -> Path:
     """Put the networks of several folders into one."""
     for task, job in networks.items():
-        _copy(job.folder, folder, task)
+        if task == FOREST:
+            write_bytes(forest_file(folder), forest_file(job.folder).read_bytes())
+        else:
+            copy_weights(job.folder, folder, task)
     return folder
-
-
-def _copy(source: Path, target: Path, task: str) -> None:
-    """Copy a network or a forest, byte by byte."""
-    for path in (source / f"{task}.safetensors", source / f"{task}.json"):
-        if path.exists():  # a forest is one file
-            write_bytes(target / path.name, path.read_bytes())
 
 
 def _fingerprint(source: str, splits: tuple[str, ...]) -> str:
