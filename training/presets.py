@@ -6,7 +6,8 @@ changed, all of it here: BatchNorm, a one-sided correlation, predictions in unit
 with warm-up and a cosine end, gradient clipping, a compressed loss schedule, milder colour changes, flips, heads
 that work at the features' half resolution and also see matching costs around the disparity, how the disparity lies in
 its surroundings and, for GradNet, their slopes (`training.networks.evidence`), since the features of a small regressor
-hold too little of these; and, in `small`, some of the heads' crops are sheared into slants (docs/ablations.md).
+hold too little of these; and, in `small`, some of the heads' crops are sheared
+into slants, and GradNet looks further around (dilations; docs/ablations.md).
 """
 
 from __future__ import annotations
@@ -277,6 +278,9 @@ FULL_GRADNET = GradNetPreset(
     ),
     validation_interval=10_000,
 )
+WIDE_DILATIONS = (1, 2, 4, 8)
+"""With half resolution a reach of 30 pixels to every side, which slopes of other worlds want and probabilities do not
+(docs/ablations.md)."""
 SMALL_GRADNET = GradNetPreset(
     steps=5000,
     batch_size=4,
@@ -284,7 +288,7 @@ SMALL_GRADNET = GradNetPreset(
     crop_height=128,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=100),
     augmentation=SLANTED_AUGMENTATION,
-    network=replace(SMALL_CONFNET.network, dropout=0.0),
+    network=replace(SMALL_CONFNET.network, dropout=0.0, dilations=WIDE_DILATIONS),
     validation_interval=500,
 )
 TINY_GRADNET = replace(
@@ -292,12 +296,12 @@ TINY_GRADNET = replace(
     steps=200,
     augmentation=SMALL_AUGMENTATION,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=20),
+    network=replace(SMALL_GRADNET.network, dilations=(1, 1, 1, 1)),
     validation_interval=100,
     validation_samples=16,
 )
+"""So short a run learns more where it looks next to a pixel than further around (docs/ablations.md)."""
 
-WIDE_DILATIONS = (1, 2, 4, 8)
-"""With half resolution a reach of 30 pixels to every side."""
 SMALL_FREE_CONFNET = FreeConfNetPreset(
     steps=SMALL_CONFNET.steps,
     batch_size=4,
@@ -323,7 +327,7 @@ SMALL_FREE_GRADNET = FreeGradNetPreset(
     crop_height=128,
     optimizer=SMALL_GRADNET.optimizer,
     augmentation=SLANTED_AUGMENTATION,
-    network=replace(SMALL_GRADNET.network, feature_channels=FREE_FEATURES, dilations=WIDE_DILATIONS),
+    network=replace(SMALL_GRADNET.network, feature_channels=FREE_FEATURES),
     validation_interval=500,
 )
 TINY_FREE_GRADNET = replace(
