@@ -45,6 +45,11 @@ from training.weights import copy_weights, has_weights
 
 FINEST_ONLY = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 EVEN = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+DILATIONS = {
+    "dilations 1": (1, 1, 1, 1),
+    "dilations 1, 2, 4, 4": (1, 2, 4, 4),
+    "dilations 1, 2, 4, 8": (1, 2, 4, 8),
+}
 
 
 def _staged(steps: int) -> dict[str, Any]:
@@ -102,8 +107,9 @@ def heads(base: ConfNetPreset | GradNetPreset, dropouts: dict[str, float]) -> di
         "full resolution": {"half_resolution": False},
         **{name: {"dropout": value} for name, value in dropouts.items()},
         "no normalisation": {"normalization": "none"},
-        "dilations 1, 2, 4, 4": {"dilations": (1, 2, 4, 4)},
-        "dilations 1, 2, 4, 8": {"dilations": (1, 2, 4, 8)},
+        **{
+            name: {"dilations": value} for name, value in DILATIONS.items() if value != base.network.dilations
+        },
         "width 64": {"width": 64, "hidden": 128},
         "32 features": {"features": "decoded"},
     }

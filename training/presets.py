@@ -6,8 +6,8 @@ changed, all of it here: BatchNorm, a one-sided correlation, predictions in unit
 with warm-up and a cosine end, gradient clipping, a compressed loss schedule, milder colour changes, flips, heads
 that work at the features' half resolution and also see matching costs around the disparity, how the disparity lies in
 its surroundings and, for GradNet, their slopes (`training.networks.evidence`), since the features of a small regressor
-hold too little of these; and, in `small`, some of the heads' crops are sheared
-into slants, and GradNet looks further around (dilations; docs/ablations.md).
+hold too little of these; and, in `small`, some of the heads' crops are sheared into slants, and GradNet looks further
+around (dilations; docs/ablations.md).
 """
 
 from __future__ import annotations
