@@ -9,7 +9,6 @@ replaced when the scene is rendered again.
 
 from __future__ import annotations
 
-import fcntl
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -22,6 +21,7 @@ from storage import (
     LocalTree,
     TemporaryFolders,
     Tree,
+    locked,
     remove_folder,
     temporary_files_in,
     temporary_folder,
@@ -72,7 +72,7 @@ class StagingArea:
         if not self.within_tree:
             yield
             return
-        with _locked(self.folder / COMMITS, fcntl.LOCK_SH), _locked(self.folder / f"{split}-{scene}.commit"):
+        with locked(self.folder / COMMITS, shared=True), locked(self.folder / f"{split}-{scene}.commit"):
             yield
 
 
@@ -95,20 +95,11 @@ def _clear(tree: Tree, area: Path) -> None:
     """
     with (
         suppress(FileNotFoundError),
-        _locked(area / COMMITS),
+        locked(area / COMMITS),
     ):  # Somebody may have removed the whole data set.
         for split, scene in _unfinished_scenes(area):
             discard_uncommitted(tree, split, scene)
         remove_folder(area)
-
-
-@contextmanager
-def _locked(path: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
-    """Hold a lock on a file in an existing folder, which is made; where there are no locks, nothing is held."""
-    with path.open("a") as file:
-        with suppress(OSError):
-            fcntl.flock(file, kind)
-        yield
 
 
 def _unfinished_scenes(area: Path) -> set[tuple[str, int]]:

@@ -8,7 +8,7 @@ import logging
 import signal
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ import torch
 from pytorch_lightning.loggers import TensorBoardLogger
 
 from refine.baselines.ours import Ours
-from storage import write_text
+from storage import alone, write_text
 from training.callbacks import BestWeights, RunProgress
 from training.checkpoints import WholeCheckpoints, last_checkpoint
 from training.data import DEFAULT_CACHE_BYTES, Source, StereoDataModule, open_sources
@@ -65,6 +65,7 @@ from training.weights import (
 
 CALIBRATION_BATCHES = 20
 CHECKPOINT = "last.ckpt"
+LOCK = ".lock"
 
 
 def train(
@@ -137,22 +138,17 @@ def train(
         refinement = refinement or Ours()
     elif refinement is not None:
         raise TrainingError(f"only joint trains through a refinement, {task} does not")
-    checkpoint = _prepare(
-        out,
-        task,
-        resume,
-        {
-            "preset": asdict(preset),
-            "steps": steps,
-            "seed": seed,
-            "data": [[str(source), weight] for source, weight in data],
-            "validation": [str(source) for source in validation],
-            "pseudo": None if pseudo is None else str(pseudo),
-            "precision": precision,
-            "processes": process_count(),
-            "refinement": None if refinement is None else asdict(refinement),
-        },
-    )
+    settings = {
+        "preset": asdict(preset),
+        "steps": steps,
+        "seed": seed,
+        "data": [[str(source), weight] for source, weight in data],
+        "validation": [str(source) for source in validation],
+        "pseudo": None if pseudo is None else str(pseudo),
+        "precision": precision,
+        "processes": process_count(),
+        "refinement": None if refinement is None else asdict(refinement),
+    }
     module = StereoDataModule(sources, held_out, preset, steps, seed, workers, cache_bytes)
     summary = TrainingSummary(
         preset_name,
@@ -163,7 +159,8 @@ def train(
         fingerprints=tuple(source.fingerprint for source in sources),
         revision=code_revision(),
     )
-    with _quiet_lightning(), _interruptible(), torch.random.fork_rng():
+    with _only_writer(out, task), _quiet_lightning(), _interruptible(), torch.random.fork_rng():
+        checkpoint = _prepare(out, task, resume, settings)
         torch.manual_seed(seed)
         lightning_task, regressor_sha256 = _build_task(preset, module, out, init, refinement, steps, seed)
         if hardware["accelerator"] == "cpu" or precision != "32" or not torch.cuda.is_available():
@@ -212,6 +209,20 @@ def _kept_networks(task: str, lightning_task: StereoTask) -> dict[str, Any]:
     kept = lightning_task.kept_network
     parts = [kept.confnet, kept.gradnet] if isinstance(kept, JointHeads) else [kept]
     return dict(zip(written_by(task), parts, strict=True))
+
+
+@contextmanager
+def _only_writer(out: Path, task: str) -> Iterator[None]:
+    """Keep a second run out of the folder: it would write over the first one's checkpoints and weights."""
+    with ExitStack() as stack:
+        if process_rank() == 0:  # torchrun's other processes write nothing
+            try:
+                stack.enter_context(alone(out / "logs" / task / LOCK))
+            except BlockingIOError:
+                raise TrainingError(
+                    f"{out}: another process is training its {task} right now; wait for it, or choose another folder"
+                ) from None
+        yield
 
 
 def _prepare(out: Path, task: str, resume: bool, settings: dict[str, Any]) -> Path | None:

@@ -7,7 +7,8 @@ every other command takes them), `evaluations/`, `statistics/`, and `results/`, 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from refine.archive import read_evaluation, write_evaluation
 from refine.evaluation import EvaluationOptions
 from refine.methods import table_order
 from scenes.serialization import to_plain
-from stereoforge.errors import UsageError
+from stereoforge.errors import CommandError, UsageError
 from stereoforge.evaluation import TestData, evaluate_set, evaluation_options, family_of
 from stereoforge.forest import PLANS, train_forest
 from stereoforge.prediction import forest_file, open_predictors, open_settings, parameters_file
@@ -31,7 +32,7 @@ from stereoforge.study.results import StudyResult, write_results
 from stereoforge.study.statistics import describe, read_statistics, write_statistics
 from stereoforge.tuning import VALIDATION, Tuning, validation_frames
 from stereoforge.tuning import describe as describe_tuning
-from storage import write_bytes
+from storage import alone, write_bytes
 from training.model_card import write_model_card
 from training.presets import Preset, change_preset, find_preset
 from training.train import train
@@ -63,20 +64,37 @@ def run_study(
         CommandError, DatasetError, TrainingError: What its steps raise.
     """
     study = _Study(plan, out, presets, device)
-    run_jobs(study.jobs)
-    return write_results(
-        plan,
-        out / "results",
-        cells={key: read_evaluation(job.folder) for key, job in study.evaluations.items()},
-        fine_tuned={name: read_evaluation(job.folder) for name, job in study.fine_tuned.items()},
-        statistics={name: read_statistics(job.folder / STATISTICS) for name, job in study.statistics.items()},
-        weights=study.runs[plan.subject].folder,
-    )
+    with _only_writer(out):
+        run_jobs(study.jobs)
+        return write_results(
+            plan,
+            out / "results",
+            cells={key: read_evaluation(job.folder) for key, job in study.evaluations.items()},
+            fine_tuned={name: read_evaluation(job.folder) for name, job in study.fine_tuned.items()},
+            statistics={
+                name: read_statistics(job.folder / STATISTICS) for name, job in study.statistics.items()
+            },
+            weights=study.runs[plan.subject].folder,
+        )
+
+
+@contextmanager
+def _only_writer(out: Path) -> Iterator[None]:
+    """Keep a second study out of the folder: both would do each step, into the same files."""
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(alone(out / LOCK))
+        except BlockingIOError:
+            raise CommandError(
+                f"{out}: another process is at this study right now; wait for it, or choose another folder"
+            ) from None
+        yield
 
 
 FOREST = "rdf"
 """The random forest among a domain's networks."""
 STATISTICS = "statistics.json"
+LOCK = ".lock"
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,12 @@ from refine.methods import default_methods
 from refine.results import EvaluatedSet
 from scenes import FAMILIES
 from stereoforge.cli import main
-from stereoforge.errors import UsageError
+from stereoforge.errors import CommandError, UsageError
 from stereoforge.study import DomainPlan, StudyPlan, StudyResult, read_plan, run_study
 from stereoforge.study.gap import Gap, gaps, summary
 from stereoforge.study.jobs import Job, make_job, run_jobs
 from stereoforge.study.plan import NETWORKS
+from storage import alone
 from tests.refine.worlds import toy_frame
 from tests.stereoforge.test_submission import kitti_set
 from training.presets import Preset, find_preset
@@ -298,6 +299,15 @@ def test_a_study_leaves_what_it_promises(plan: StudyPlan, study: tuple[Path, Stu
     for name in ("tables.md", "tables.tex", "tables.csv", "plan.yaml", "gap.json", "figures/disparities.svg"):
         assert (out / "results" / name).stat().st_size > 0
     assert read_plan(out / "results" / "plan.yaml") == plan
+
+
+def test_two_studies_do_not_share_a_folder(plan: StudyPlan, tmp_path: Path) -> None:
+    with (
+        alone(tmp_path / ".lock"),
+        pytest.raises(CommandError, match="another process is at this study right now"),
+    ):
+        run_study(plan, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [".lock"]
 
 
 @pytest.mark.slow

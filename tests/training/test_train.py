@@ -15,6 +15,7 @@ import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from datagen import DatasetError, StereoDataset
+from storage import alone
 from tests.datagen.sources import published
 from tests.training.synthetic import random_pair, write_dataset
 from training.augmentation import NO_AUGMENTATION
@@ -337,6 +338,11 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
         train("regressor", source, run, quick_regressor(), steps=6, progress=False)
     with pytest.raises(TrainingError, match="started with another steps"):
         train("regressor", source, run, quick_regressor(), steps=7, resume=True, progress=False)
+    with (
+        alone(run / "logs" / "regressor" / ".lock"),
+        pytest.raises(TrainingError, match="another process is training its regressor right now"),
+    ):
+        train("regressor", source, run, quick_regressor(), steps=6, resume=True, progress=False)
     with pytest.raises(TrainingError, match="no device 'abacus'"):
         train("regressor", source, tmp_path / "device", quick_regressor(), device="abacus")
     with pytest.raises(
