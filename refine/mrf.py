@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -112,11 +112,18 @@ def solve_mrf(
     began = time.perf_counter()
     if form not in ("exact", "paper"):
         raise ValueError(f"the MRF's form is 'exact' or 'paper', not {form!r}")
+    problem = checked_problem(disparity, confidence, gradient, image, parameters, form, x0)
+    solution = solve_problem(problem, solver, tolerance)
+    return replace(solution, info=replace(solution.info, seconds=time.perf_counter() - began))
+
+
+def solve_problem(problem: Problem, solver: SolverName, tolerance: float) -> MRFSolution:
+    """Solve by the named solver, or by the direct one where that does not converge."""
+    began = time.perf_counter()
     if solver not in ("auto", *_SOLVERS):
         raise ValueError(f"the MRF's solver is one of 'auto', 'multigrid', 'cg', 'direct', not {solver!r}")
     if not 0 < tolerance < 1:
         raise ValueError(f"the solver's tolerance must be between 0 and 1, got {tolerance}")
-    problem = checked_problem(disparity, confidence, gradient, image, parameters, form, x0)
     name = solver
     if solver == "auto":
         name = "direct" if problem.disparity.size <= _DIRECT_UP_TO_PIXELS else "multigrid"
@@ -164,7 +171,7 @@ def _solve(problem: Problem, name: str, tolerance: float) -> tuple[LinearSolutio
         f"the {name} solver stopped at a relative residual of {solution.relative_residual:.1e}, "
         f"short of {tolerance:.1e}, after {solution.iterations} iterations; solving directly instead",
         ConvergenceWarning,
-        stacklevel=4,
+        stacklevel=5,
     )
     return solve(problem, "direct", tolerance), "direct"
 

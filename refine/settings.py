@@ -16,6 +16,7 @@ from typing import Any
 import cattrs
 
 from refine.baselines.ours import Ours
+from refine.baselines.ours_robust import OursRobust
 from refine.methods import Method, default_methods, known_methods
 from refine.tuning import Trial, TunedMethod
 from storage import write_text
@@ -45,6 +46,13 @@ class Settings:
         """The MRF."""
         method = self.method(Ours.name)
         assert isinstance(method, Ours)
+        return method
+
+    @property
+    def ours_robust(self) -> OursRobust:
+        """The MRF with a robust gradient term."""
+        method = self.method(OursRobust.name)
+        assert isinstance(method, OursRobust)
         return method
 
     def rows(self, names: tuple[str, ...] = ()) -> tuple[Method, ...]:

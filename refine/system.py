@@ -100,14 +100,20 @@ def build_system(
     image: NDArray[np.uint8],
     parameters: MRFParameters,
     form: Form,
+    gradient_factor: Floats | None = None,
 ) -> MRFSystem:
-    """Put a refinement problem into equations (shapes as for `refine.refine_disparity`, not checked here)."""
+    """Put a refinement problem into equations (shapes as for `refine.refine_disparity`, not checked here).
+
+    `gradient_factor`, (H, W, 2), multiplies the weights of the gradient terms.
+    """
     phi_x, phi_y = edge_weights(image, parameters.sigma_r)
     data_weight = np.maximum(confidence, parameters.confidence_floor).ravel()
     matrix = sp.diags_array(data_weight)
     right_hand_side = data_weight * disparity.ravel()
-    for axis, phi, wanted in ((1, phi_x, gradient[..., 0]), (0, phi_y, gradient[..., 1])):
-        weight = parameters.alpha * np.where(np.isfinite(wanted), phi, 0.0).ravel()
+    factor = np.ones_like(gradient) if gradient_factor is None else gradient_factor
+    for channel, (axis, phi) in enumerate(((1, phi_x), (0, phi_y))):
+        wanted = gradient[..., channel]
+        weight = parameters.alpha * np.where(np.isfinite(wanted), phi * factor[..., channel], 0.0).ravel()
         difference = forward_difference(disparity.shape, axis)
         weighted = sp.csr_array(difference.T @ sp.diags_array(weight))
         matrix = matrix + weighted @ difference

@@ -69,6 +69,10 @@ class Preset:
     curriculum: float = 0.0
     """Share of the run over which the crops come from a growing first part of every data set, in its own order, so that
     one rendered from simple to complex is seen that way; 0 draws from all from the beginning (ours)."""
+    fixed_statistics: float = 0.0
+    """Share of the run, its last, over which BatchNorm normalises by fixed statistics, as it does on frames, and the
+    weights get used to them: 0 leaves every batch its own to the end, 1 keeps those of the network that the run starts
+    from (ours)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,6 +199,7 @@ SMALL_REGRESSOR = RegressorPreset(
     loss_stages=(STATIC_WEIGHTS,),
     stage_ends=(),
     validation_interval=500,
+    fixed_statistics=0.3,
 )
 TINY_REGRESSOR = replace(
     SMALL_REGRESSOR,
@@ -223,6 +228,7 @@ SMALL_FINE_TUNING = FineTuningPreset(
     optimizer=replace(SMALL_OPTIMIZER, learning_rate=1e-4, warmup_steps=100),
     augmentation=replace(SMALL_AUGMENTATION, log_zoom=(0.0, 0.0), log_squeeze=(0.0, 0.0)),
     validation_interval=500,
+    fixed_statistics=1.0,
 )
 TINY_FINE_TUNING = replace(
     SMALL_FINE_TUNING,

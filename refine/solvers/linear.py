@@ -29,6 +29,8 @@ class Problem:
     form: Form
     start: Floats
     """(H, W) where the iterations begin."""
+    gradient_factor: Floats | None = None
+    """(H, W, 2) factors of the gradient terms' weights alpha phi, not negative; 1 if None."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -38,7 +40,13 @@ class Problem:
     def system(self) -> MRFSystem:
         """The problem as sparse matrices in float64."""
         return build_system(
-            self.disparity, self.confidence, self.gradient, self.image, self.parameters, self.form
+            self.disparity,
+            self.confidence,
+            self.gradient,
+            self.image,
+            self.parameters,
+            self.form,
+            self.gradient_factor,
         )
 
 

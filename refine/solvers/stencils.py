@@ -49,8 +49,8 @@ class Couplings:
     weights: Singles
     """(8, H, W) w_pq towards each of `NEIGHBORS`."""
     axial: Singles
-    """(2, H, W) weight of the gradient term to the right and downwards: alpha phi, 0 where there is no
-    term."""
+    """(2, H, W) weight of the gradient term to the right and downwards: alpha phi, times `Problem.gradient_factor`, 0
+    where there is no term."""
     color: Singles
     """(H, W) beta (2 - phi_x - phi_y)."""
 
@@ -175,6 +175,10 @@ def couplings_of(problem: Problem, tau: Singles, first: int = 0, last: int | Non
         made.axial,
         made.color,
     )
+    if problem.gradient_factor is not None:
+        top, bottom = max(first - MARGIN, 0), min(last + MARGIN, problem.shape[0])
+        here = made.axial[:, top - first + MARGIN : bottom - first + MARGIN, MARGIN:-MARGIN]
+        here *= np.moveaxis(problem.gradient_factor[top:bottom], 2, 0)
     return made
 
 

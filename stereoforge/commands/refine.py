@@ -60,6 +60,9 @@ class Refine:
     """The MRF's parameters, as `stereoforge tune` writes them."""
     form: Annotated[Literal["exact", "paper"] | None, shown("exact|paper", "as validated, else exact")] = None
     """exact minimises the energy; paper solves the paper's eq. 8 as printed."""
+    robust: bool = False
+    """Refine by ours_robust instead of the paper's MRF: disparities may step where the image does not; takes five
+    solves."""
     deviation: bool = False
     """Also write deviation.pfm, the refined disparity's standard deviation in pixels under the MRF's own Gaussian (of
     the exact form): its order, least sure last, is what it is good for. Takes 32 more solves."""
@@ -78,14 +81,14 @@ class Refine:
             other = None if self.disparity_right is None else read_disparity(self.disparity_right, size)
             given = read_disparity(self.disparity, size), other
         elsewhere: Literal["networks", "sgbm"] = "sgbm" if given is not None else self.predictor
-        ours = open_settings(self.parameters, self.weights, elsewhere).ours
-        if self.form is not None:
-            ours = replace(ours, form=self.form)
+        settings = open_settings(self.parameters, self.weights, elsewhere)
+        ours = settings.ours if self.form is None else replace(settings.ours, form=self.form)
+        method = settings.ours_robust if self.robust else ours
         prediction, notes = predict_pair(left, right, given, self.weights, self.device, self.predictor)
         assert prediction.confidence is not None
         assert prediction.gradient is not None
         with console.status("refining; the first time after an install this compiles for a minute"):
-            solution = ours.solve(prediction.disparity, prediction.confidence, prediction.gradient, left)
+            solution = method.solve(prediction.disparity, prediction.confidence, prediction.gradient, left)
         deviation = None
         if self.deviation:
             deviation = ours.sample(
@@ -105,6 +108,8 @@ class Refine:
             raise UsageError("--disparity and --predictor sgbm both give the disparity; choose one")
         if self.disparity_right is not None and self.disparity is None:
             raise UsageError("--disparity-right goes with --disparity")
+        if self.robust and (self.form is not None or self.deviation):
+            raise UsageError("--form and --deviation are of the paper's MRF, without --robust")
 
     def _write(
         self,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.optimize import minimize
 
 from refine import MRFParameters
 from tests.refine.worlds import Problem
@@ -69,6 +70,35 @@ def dense_minimiser(problem: Problem, parameters: MRFParameters) -> np.ndarray:
             matrix[row, pixel] += np.sqrt(weight) * coefficient
         wanted[row] = np.sqrt(weight) * value
     return np.linalg.lstsq(matrix, wanted, rcond=None)[0].reshape(problem.disparity.shape)
+
+
+def robust_minimiser(problem: Problem, parameters: MRFParameters, scale: float) -> np.ndarray:
+    """argmin of E with Charbonnier's penalty for the gradient terms, by quasi-Newton steps on E itself."""
+    terms = energy_terms(problem, parameters)
+    matrix = np.zeros((len(terms), problem.disparity.size))
+    weights, wanted, robust = (np.zeros(len(terms)) for _ in range(3))
+    for row, (weight, coefficients, value) in enumerate(terms):
+        for pixel, coefficient in coefficients.items():
+            matrix[row, pixel] += coefficient
+        weights[row], wanted[row] = weight, value
+        # A pixel's terms come in this order: data, gradients, colour; the last of these has nothing to be like.
+        robust[row] = len(coefficients) == 2 and value != 0
+
+    def energy(x: np.ndarray) -> tuple[float, np.ndarray]:
+        off = matrix @ x - wanted
+        root = np.sqrt(1 + (off / scale) ** 2)
+        penalty = np.where(robust, 2 * scale**2 * (root - 1), off**2)
+        slope = np.where(robust, 2 * off / root, 2 * off)
+        return float(weights @ penalty), matrix.T @ (weights * slope)
+
+    found = minimize(
+        energy,
+        problem.disparity.ravel(),
+        jac=True,
+        method="L-BFGS-B",
+        options={"maxiter": 20000, "maxfun": 40000, "ftol": 1e-15, "gtol": 1e-9, "maxcor": 50},
+    )
+    return found.x.reshape(problem.disparity.shape)
 
 
 def dense_paper_solution(problem: Problem, parameters: MRFParameters) -> np.ndarray:

@@ -205,6 +205,10 @@ def test_refine_writes_what_it_promises(demo: tuple[Path, DemoResult], tmp_path:
     refined = read_pfm(tmp_path / "r" / "disparity.pfm")
     assert refined.shape == (192, 384)
     assert np.isfinite(refined).all()
+    assert run("refine", *pair, "--weights", out / "weights", "--out", tmp_path / "robust", "--robust") == 0
+    robust = read_pfm(tmp_path / "robust" / "disparity.pfm")
+    assert np.isfinite(robust).all()
+    assert np.abs(robust - refined).max() > 0.1
 
 
 @pytest.mark.slow
@@ -222,6 +226,7 @@ def test_refine_says_what_is_wrong_with_its_inputs(
     assert "40x30" in refused(1, "refine", left, small, *common)
     weightless = ("--weights", tmp_path / "nothing", "--out", tmp_path / "r")
     assert "nothing" in refused(1, "refine", left, left, *weightless)
+    assert "without --robust" in refused(2, "refine", left, left, *common, "--robust", "--form", "paper")
     part = tmp_path / "part"
     part.mkdir()
     for file in (out / "weights").glob("regressor.*"):

@@ -65,6 +65,37 @@ def scalars(run: Path, task: str, name: str) -> dict[int, float]:
     return {event.step: event.value for event in events.Scalars(name)}
 
 
+def test_statistics_are_measured_once_and_then_fixed(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the middle of a run BatchNorm normalises by the mean over a block of what it saw of each batch."""
+    seen: list[tuple[torch.Tensor, torch.Tensor]] = []  # a batch's mean and variance, in the first BatchNorm
+    known: list[torch.Tensor] = []  # the running mean and variance after each step
+
+    def note(norm: torch.nn.Module, inputs: tuple[torch.Tensor]) -> None:
+        if norm.training:
+            seen.append((inputs[0].mean((0, 2, 3)).detach(), inputs[0].var((0, 2, 3)).detach()))
+
+    def begin(task: StereoTask) -> None:
+        first = next(part for part in task.network.modules() if isinstance(part, torch.nn.BatchNorm2d))
+        first.register_forward_pre_hook(note)
+
+    def end(task: StereoTask, *_: object) -> None:
+        first = next(part for part in task.network.modules() if isinstance(part, torch.nn.BatchNorm2d))
+        known.append(torch.cat([first.running_mean, first.running_var]).clone())
+
+    monkeypatch.setattr(StereoTask, "on_train_start", begin)
+    monkeypatch.setattr(StereoTask, "on_train_batch_end", end)
+    preset = replace(quick_regressor(), fixed_statistics=0.5)
+    train("regressor", [(data, 1.0)], tmp_path, preset, steps=8, progress=False)
+    assert len(seen) == 8  # four steps, then the four batches that are measured over
+    measured = seen[4:]
+    expected = [torch.stack(part).mean(0) for part in zip(*measured, strict=True)]
+    assert not torch.equal(known[2], known[3])
+    for later in known[4:]:
+        torch.testing.assert_close(later, torch.cat(expected))
+
+
 @pytest.mark.slow
 def test_overfits_four_samples(data: Path, tmp_path: Path) -> None:
     """The regressor, then both heads on it, learn four pairs (mean disparity about 10 px) nearly by heart."""
