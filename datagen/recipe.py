@@ -200,7 +200,8 @@ def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
     Raises DatasetError naming the first setting that differs.
     """
     before, after = (_flat(to_plain(replace(recipe, scenes={}))) for recipe in (existing, wanted))
-    for key in sorted(set(before) | set(after)):
+    # Another family has other settings altogether; that it is another one is what to say.
+    for key in sorted(set(before) | set(after), key=lambda key: (key != "world.family", key)):
         if before.get(key) != after.get(key):
             raise DatasetError(
                 f"{folder} was rendered with {key} {before.get(key)}, not {after.get(key)}: "

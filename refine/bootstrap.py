@@ -20,6 +20,8 @@ REFERENCE = "regressor"
 """Ratios are to this method."""
 LEVEL = 0.95
 RESAMPLES = 1000
+FEWEST_SCENES = 5
+"""Of fewer, the ends of a percentile interval are little more than the best and the worst scene's own."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Bootstrap:
 
 
 def bootstrap(evaluation: Evaluation, resamples: int = RESAMPLES, seed: int = 0) -> Bootstrap:
-    """Resample an evaluation's scenes; with fewer than two scenes nothing is known and every end is NaN."""
+    """Resample an evaluation's scenes; with fewer than `FEWEST_SCENES` nothing is known and every end is NaN."""
     scenes = list(dict.fromkeys(frame.scene for frame in evaluation.frames))
     count = len(scenes)
     draws = np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), size=resamples)
@@ -95,7 +97,7 @@ def _resampled(draws: NDArray[np.float64], sums: NDArray[np.float64]) -> NDArray
 
 def _interval(sample: NDArray[np.float64], scenes: int) -> Interval:
     known = sample[np.isfinite(sample)]
-    if scenes < 2 or known.size == 0:
+    if scenes < FEWEST_SCENES or known.size == 0:
         return UNKNOWN
     low, high = np.quantile(known, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return Interval(float(low), float(high))

@@ -6,7 +6,6 @@ Frames are read one at a time and dropped, but for the few whose pictures the re
 
 from __future__ import annotations
 
-import heapq
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -39,12 +38,12 @@ class EvaluationOptions:
     """Ground-truth forward differences above it are discontinuities, left out of the masked gradient
     error."""
     first_panels: int = 4
-    """Frames shown because they come first."""
+    """Frames shown because they come first, of as many scenes as there are."""
     posterior_samples: int = 0
     """Samples a frame by which the judged method's standard deviations are estimated; 0 leaves them out. Each takes as
     long as a refinement."""
     worst_panels: int = 3
-    """Frames shown because `Evaluation.judged` has its largest end-point errors there."""
+    """Frames shown because `Evaluation.judged` has its largest end-point errors there, one a scene."""
 
 
 @dataclass(frozen=True)
@@ -165,8 +164,10 @@ class _Run:
         self.skipped: dict[str, str] = {}
         self.pools: dict[str, MethodPool] = {}
         self.scores: list[FrameScore] = []
-        self.first: list[Panel] = []
-        self.worst: list[tuple[float, int, Panel]] = []
+        self.first: dict[str, Panel] = {}
+        self.spare: list[Panel] = []
+        """The first frames that are not their scene's first, for when there are fewer scenes than panels."""
+        self.worst: dict[str, tuple[float, Panel]] = {}
 
     def take(self, frame: EvaluationFrame) -> None:
         """Evaluate one frame."""
@@ -203,8 +204,8 @@ class _Run:
             scores={name: pool.score() for name, pool in self.pools.items()},
             skipped=self.skipped,
             frames=tuple(self.scores),
-            first=tuple(self.first),
-            worst=tuple(panel for _, _, panel in sorted(self.worst, key=lambda entry: -entry[0])),
+            first=self._first_panels(),
+            worst=tuple(panel for _, panel in sorted(self.worst.values(), key=lambda entry: -entry[0])),
             judged=self.judged,
         )
 
@@ -224,13 +225,22 @@ class _Run:
         return MethodPool.empty(self.options.bad_threshold, self.options.gradient_threshold)
 
     def _keep(self, panel: Panel, error: float) -> None:
-        """Keep the frame's arrays if it is among the first or, so far, among the worst."""
+        """Keep the frame's arrays if it is among the first or, so far, among the worst; one frame a scene."""
+        scene = panel.frame.scene or panel.frame.name
         if len(self.first) < self.options.first_panels:
-            self.first.append(panel)
-        if np.isfinite(error):
-            heapq.heappush(self.worst, (error, panel.order, panel))
+            if scene not in self.first:
+                self.first[scene] = panel
+            elif len(self.spare) < self.options.first_panels:
+                self.spare.append(panel)
+        if np.isfinite(error) and error > self.worst.get(scene, (-1.0,))[0]:
+            self.worst[scene] = error, panel
             if len(self.worst) > self.options.worst_panels:
-                heapq.heappop(self.worst)
+                del self.worst[min(self.worst, key=lambda name: self.worst[name][0])]
+
+    def _first_panels(self) -> tuple[Panel, ...]:
+        """The first frame of each of the first scenes, and further ones of them where there are few, in order."""
+        chosen = [*self.first.values(), *self.spare][: self.options.first_panels]
+        return tuple(sorted(chosen, key=lambda panel: panel.order))
 
     def _refined_aucs(
         self, frame: EvaluationFrame, disparities: dict[str, NDArray[np.float32]]

@@ -8,11 +8,10 @@ import re
 import signal
 import sys
 from collections.abc import Iterator, Sequence
+from importlib.metadata import version
 from typing import Any
 
-import tyro
-
-from stereoforge.commands import COMMANDS, after_interruption
+from stereoforge.commands import COMMANDS, after_interruption, command_class
 from stereoforge.errors import CommandError, UsageError
 
 DEBUG_FLAG = "--debug"
@@ -31,9 +30,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; always ends in SystemExit: 0 success, 1 failure, 2 wrong usage, 130 interrupted."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = DEBUG_FLAG in words
-    command = _parse([word for word in words if word != DEBUG_FLAG])
+    if words == ["--version"]:
+        print(f"stereoforge {version('stereoforge')}")
+        sys.exit(0)
+    command = None
     try:
         with _terminated_like_interrupted():
+            command = _parse([word for word in words if word != DEBUG_FLAG])
             command.run()
     except KeyboardInterrupt:
         sys.exit(_say(f"interrupted; {after_interruption(command)}", 130))
@@ -56,19 +59,23 @@ def _terminated_like_interrupted() -> Iterator[None]:
 
 def _parse(words: Sequence[str]) -> Any:
     """The command the words ask for; SystemExit 2 with one sentence if they ask for none, 0 after --help."""
+    import tyro  # half a second in which an interruption is to be as clean as later
+
+    settings: dict[str, Any] = {
+        "config": (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
+    }
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
+            if words and words[0] in COMMANDS:
+                found = command_class(words[0])
+                return tyro.cli(found, prog=f"stereoforge {words[0]}", args=words[1:], **settings)
             return tyro.extras.subcommand_cli_from_dict(
-                COMMANDS,
+                {name: command_class(name) for name in COMMANDS},
                 prog="stereoforge",
                 description="Make stereo training sets in Blender, train stereo networks on them, refine disparity.",
                 args=words,
-                config=(
-                    tyro.conf.OmitArgPrefixes,
-                    tyro.conf.FlagCreatePairsOff,
-                    tyro.conf.HelptextFromCommentsOff,
-                ),
+                **settings,
             )
     except SystemExit as end:
         if end.code == 2:

@@ -5,19 +5,27 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from datagen.disparity_histogram import DisparityHistogram
 from stereoforge.errors import UsageError
 
+if TYPE_CHECKING:
+    from datagen.disparity_histogram import DisparityHistogram
 
-def shown(metavar: str, default: object = None) -> Any:
-    """How a flag looks in --help: its value's name, and the default where the field's own says nothing."""
+
+def shown(metavar: str, default: object = None, text: str | None = None) -> Any:
+    """How a flag looks in --help: its value's name, the default where the field's own says nothing, and what it does
+    where a docstring cannot say it."""
     return tyro.conf.arg(
-        metavar=metavar, help_behavior_hint=None if default is None else f"(default: {default})"
+        metavar=metavar, help_behavior_hint=None if default is None else f"(default: {default})", help=text
     )
+
+
+def several(metavar: str) -> Any:
+    """The same for a flag that takes one value or more and cannot do without."""
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint="(one or more)")
 
 
 def parse_size(text: str, flag: str = "size") -> tuple[int, int]:
@@ -38,6 +46,8 @@ def parse_range(text: str, flag: str = "disparity-range") -> tuple[float, float]
 
 def parse_histogram(text: str, flag: str = "disparity-histogram") -> DisparityHistogram:
     """The histogram of "2-20:30,20-60:50,60-120:20": ranges in pixels that follow one another, and their weights."""
+    from datagen.disparity_histogram import DisparityHistogram
+
     bins = [
         re.fullmatch(r"(\d{1,5}(?:\.\d+)?)-(\d{1,5}(?:\.\d+)?):(\d{1,9}(?:\.\d+)?)", part.strip())
         for part in text.split(",")

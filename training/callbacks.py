@@ -75,6 +75,8 @@ class RunProgress(pl.Callback):
 
     def on_train_epoch_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002
         figures = "  ".join(f"{name} {value:.4g}" for name, value in validation_figures(trainer).items())
+        if not figures:  # as when Lightning ends the checkpoint's epoch once more after resuming
+            return
         self._console.print(
             f"{self._title} step {trainer.global_step}  {figures}", highlight=False, soft_wrap=True
         )

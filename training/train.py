@@ -66,6 +66,8 @@ from training.weights import (
 CALIBRATION_BATCHES = 20
 CHECKPOINT = "last.ckpt"
 LOCK = ".lock"
+LONGEST_SHOWN = 100
+"""Of a setting in a complaint about it, in characters."""
 
 
 def train(
@@ -142,7 +144,8 @@ def train(
         "preset": asdict(preset),
         "steps": steps,
         "seed": seed,
-        "data": [[str(source), weight] for source, weight in data],
+        # What they are, not where: a data set may be named by another path, or moved.
+        "data": [[source.fingerprint, source.weight] for source in sources],
         "validation": [str(source) for source in validation],
         "pseudo": None if pseudo is None else str(pseudo),
         "precision": precision,
@@ -367,8 +370,14 @@ def _check_settings(path: Path, settings: dict[str, Any]) -> None:
     for key, value in json.loads(json.dumps(settings)).items():
         if stored.get(key) != value:
             raise TrainingError(
-                f"{path}: the run was started with another {key}, so it cannot be resumed with this"
+                f"{path}: the run was started with another {key} ({_brief(stored.get(key))}, not {_brief(value)}), "
+                "so it cannot be resumed"
             )
+
+
+def _brief(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]} ..."
 
 
 @contextmanager

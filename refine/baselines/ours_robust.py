@@ -14,6 +14,9 @@ from refine.mrf import DEFAULT_TOLERANCE, MRFSolution, SolverName
 from refine.parameters import MRFParameters
 from refine.robust import DEFAULT_REWEIGHTINGS, DEFAULT_SCALE, solve_robust
 
+_PARAMETERS = MRFParameters(alpha=300.0, beta=0.003, sigma_r=8.0, confidence_floor=1e-5)
+_SHAPE = ConfidenceShape(temperature=0.5, power=2.0)
+
 
 @dataclass(frozen=True)
 class OursRobust(Method):
@@ -32,8 +35,9 @@ class OursRobust(Method):
         "parameters.confidence_floor": (1e-5, 1e-4, 1e-3, 3e-3, 1e-2),
     }
 
-    parameters: MRFParameters = field(default_factory=MRFParameters)
-    shape: ConfidenceShape = field(default_factory=ConfidenceShape)
+    parameters: MRFParameters = field(default_factory=lambda: _PARAMETERS)
+    """What `ours` is validated to on flying things, but for alpha, which that one cannot have so large."""
+    shape: ConfidenceShape = field(default_factory=lambda: _SHAPE)
     scale: float = DEFAULT_SCALE
     """As `refine.robust.solve_robust`'s, like the reweightings."""
     reweightings: int = DEFAULT_REWEIGHTINGS

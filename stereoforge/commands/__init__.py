@@ -1,19 +1,25 @@
-"""One module a command: a frozen dataclass whose fields are its flags and whose `run` does the work."""
+"""One module a command: a frozen dataclass whose fields are its flags and whose `run` does the work.
 
-from collections.abc import Callable
+A command's module is imported when it is asked for: together they bring along half a dozen libraries.
+"""
+
+from importlib import import_module
 from typing import Any, Protocol
 
-from stereoforge.commands.demo import Demo
-from stereoforge.commands.evaluate import Evaluate
-from stereoforge.commands.export import Export
-from stereoforge.commands.export_model import ExportModel
-from stereoforge.commands.refine import Refine
-from stereoforge.commands.render import Render
-from stereoforge.commands.study import Study
-from stereoforge.commands.train import Train
-from stereoforge.commands.tune import Tune
-from stereoforge.commands.verify import Verify
-from stereoforge.commands.view import View
+COMMANDS = {
+    "render": "Render",
+    "verify": "Verify",
+    "view": "View",
+    "export": "Export",
+    "train": "Train",
+    "export-model": "ExportModel",
+    "tune": "Tune",
+    "refine": "Refine",
+    "evaluate": "Evaluate",
+    "study": "Study",
+    "demo": "Demo",
+}
+"""Every command by its name, in the order of use, and its class in the module of that name."""
 
 
 class Command(Protocol):
@@ -23,20 +29,11 @@ class Command(Protocol):
         """Do the work; whatever it raises becomes one sentence and an exit code."""
 
 
-COMMANDS: dict[str, Callable[..., Command]] = {
-    "render": Render,
-    "verify": Verify,
-    "view": View,
-    "export": Export,
-    "train": Train,
-    "export-model": ExportModel,
-    "tune": Tune,
-    "refine": Refine,
-    "evaluate": Evaluate,
-    "study": Study,
-    "demo": Demo,
-}
-"""Every command by its name, in the order of use."""
+def command_class(name: str) -> type[Command]:
+    """The dataclass of one of `COMMANDS`."""
+    module = import_module(f"stereoforge.commands.{name.replace('-', '_')}")
+    found: type[Command] = getattr(module, COMMANDS[name])
+    return found
 
 
 def after_interruption(command: Any) -> str:

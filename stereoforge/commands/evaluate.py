@@ -13,7 +13,7 @@ import tyro
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console
 from stereoforge.shipped import SHIPPED_WEIGHTS
-from stereoforge.values import parse_methods, shown
+from stereoforge.values import parse_methods, several, shown
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Evaluate:
     and .tex, and figures/.
     """
 
-    data: Annotated[tyro.conf.Positional[tuple[str, ...]], shown("DATA")]
+    data: Annotated[tyro.conf.Positional[tuple[str, ...]], several("DATA")]
     """Data sets: folders or URLs, with FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
     out: Annotated[Path, shown("REPORT")]
     """Folder for the report."""

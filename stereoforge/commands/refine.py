@@ -27,8 +27,11 @@ POSTERIOR_SAMPLES = 32
 FEW_KNOWN = 0.1
 """A disparity from elsewhere that is known at a smaller share of the pixels is taken for a mistake."""
 LOW_CONFIDENCE = 0.15
-"""A mean confidence below this, too: the shipped networks have 0.5 on a pair of photographs, 0.1 with its views
-swapped."""
+"""A mean confidence below this, too: the shipped networks have 0.4 on photographs, 0.1 on two that do not belong
+together."""
+BEYOND_INFINITY_PX = -0.5
+BEYOND_INFINITY = 0.01
+"""A share of disparities below that which is worth a remark."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,8 @@ class Refine:
                 prediction.disparity, prediction.confidence, prediction.gradient, left, POSTERIOR_SAMPLES
             )
         self._write(left, prediction, solution, deviation)
-        for note in (*notes, *_doubts(None if given is None else given[0], prediction.confidence)):
+        doubts = _doubts(None if given is None else given[0], prediction.confidence)
+        for note in (*notes, *doubts, *_doubtful_views(left, right), *_doubtful_result(solution.disparity)):
             console.print(note, markup=False)
         console.print(
             f"{self.out}: disparity {solution.disparity.min():.1f} to {solution.disparity.max():.1f} px, refined in "
@@ -108,6 +112,8 @@ class Refine:
             raise UsageError("--disparity and --predictor sgbm both give the disparity; choose one")
         if self.disparity_right is not None and self.disparity is None:
             raise UsageError("--disparity-right goes with --disparity")
+        if self.out.exists() and not self.out.is_dir():
+            raise UsageError(f"--out {self.out}: is a file, not a folder")
         if self.robust and (self.form is not None or self.deviation):
             raise UsageError("--form and --deviation are of the paper's MRF, without --robust")
 
@@ -154,3 +160,18 @@ def _doubts(given: NDArray[np.float32] | None, confidence: NDArray[np.float32]) 
             "left one first, and a disparity from elsewhere in pixels?"
         )
     return doubts
+
+
+def _doubtful_views(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> list[str]:
+    from matching.order import seem_swapped
+
+    if not seem_swapped(left, right):
+        return []
+    return ["more of the pair can be matched the other way round: is the first picture the left one?"]
+
+
+def _doubtful_result(disparity: NDArray[np.float64]) -> list[str]:
+    share = float((disparity < BEYOND_INFINITY_PX).mean())
+    if share < BEYOND_INFINITY:
+        return []
+    return [f"{share:.0%} of the refined disparities are negative, down to {disparity.min():.1f} px"]

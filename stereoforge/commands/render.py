@@ -41,8 +41,9 @@ class Render:
 
     out: Annotated[str, shown("DIR")]
     """Folder of the data set, or a URL such as s3://bucket/folder."""
-    family: Annotated[str | None, shown("NAME", DEFAULT_FAMILY)] = None
-    """What kind of world."""
+    family: Annotated[
+        str | None, shown("NAME", DEFAULT_FAMILY, f"What kind of world: {', '.join(FAMILIES)}.")
+    ] = None
     scenes: Annotated[int | None, shown("N", f"{DEFAULT_SCENES}, or the recipe's")] = None
     """How many scenes the split shall have in all."""
     frames_per_scene: Annotated[int | None, shown("N", 1)] = None

@@ -28,9 +28,9 @@ class Study:
 
     out: Annotated[Path, shown("DIR")]
     """Folder for everything."""
-    train: Annotated[tuple[str, ...], shown("DOMAIN")] = ()
+    train: Annotated[tuple[str, ...], shown("DOMAIN", "the plan's")] = ()
     """Domains to train on. The first is the subject of the study; the others give the errors in their own domain."""
-    test: Annotated[tuple[str, ...], shown("DOMAIN")] = ()
+    test: Annotated[tuple[str, ...], shown("DOMAIN", "the plan's")] = ()
     """Domains to test on."""
     plan: Annotated[Path | None, shown("FILE", "none")] = None
     """A plan.yaml that says it all, instead of the flags."""

@@ -10,7 +10,7 @@ import tyro
 
 from stereoforge.errors import UsageError
 from stereoforge.progress import console
-from stereoforge.values import parse_size, parse_weighted_source, shown
+from stereoforge.values import parse_size, parse_weighted_source, several, shown
 from storage import write_bytes
 
 
@@ -41,7 +41,7 @@ class Train:
     gradnet_free need no regressor: they learn from semi-global matching and serve any disparity. rdf: a
     random forest as ConfNet's rival. joint: trains confnet and gradnet of --init further, through the refinement,
     into another run folder."""
-    data: Annotated[tuple[str, ...], shown("DATA[:WEIGHT]")]
+    data: Annotated[tuple[str, ...], several("DATA[:WEIGHT]")]
     """Data sets, each with how often it is drawn from relative to the others (default 1): folders or URLs, with
     FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
     out: Annotated[Path, shown("RUN")]

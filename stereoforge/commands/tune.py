@@ -10,7 +10,7 @@ import tyro
 
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.progress import console
-from stereoforge.values import parse_methods, shown
+from stereoforge.values import parse_methods, several, shown
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Tune:
 
     interrupted: ClassVar[str] = "the same command run again continues where it stopped"
 
-    data: Annotated[tyro.conf.Positional[tuple[str, ...]], shown("DATA")]
+    data: Annotated[tyro.conf.Positional[tuple[str, ...]], several("DATA")]
     """Data sets, as for `evaluate`; their validation splits are used. One without splits needs #0-99 behind."""
     weights: Annotated[Path, shown("RUN")]
     """Run folder of the networks."""

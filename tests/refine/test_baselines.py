@@ -345,18 +345,18 @@ def test_every_method_runs_on_a_frame_and_is_timed():
     assert evaluation.skipped == {}
     assert set(evaluation.scores) == {
         *("regressor", "regressor_f", "gradnet", "sgbm", "wmf", "color", "tgv", "fbs", "grad", "ours"),
-        "ours_conf_gt",
+        *("ours_conf_gt", "ours_robust"),
     }
     assert all(score.seconds > 0 for score in evaluation.scores.values())
     assert evaluation.scores["regressor"].seconds == pytest.approx(2.0, abs=0.1)
     assert evaluation.scores["regressor_f"].seconds == pytest.approx(3.0, abs=0.1)
     assert evaluation.scores["regressor_f"].regions["all"].epe == pytest.approx(0.25)
     before = evaluation.scores["regressor"].regions["all"].epe
-    for name in ("color", "tgv", "fbs", "grad", "ours", "ours_conf_gt"):
+    for name in ("color", "tgv", "fbs", "grad", "ours", "ours_conf_gt", "ours_robust"):
         assert evaluation.scores[name].regions["all"].epe < before, name
 
 
-@pytest.mark.parametrize("name", ["wmf", "color", "tgv", "fbs", "grad", "ours"])
+@pytest.mark.parametrize("name", ["wmf", "color", "tgv", "fbs", "grad", "ours", "ours_robust"])
 def test_holes_and_tiny_images_are_taken(name):
     method = known_methods()[name]()
     frame = full_frame()

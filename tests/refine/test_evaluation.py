@@ -177,6 +177,19 @@ def test_the_first_and_the_worst_frames_are_kept():
     assert [panel.order for panel in evaluation.worst] == [3, 1, 4]
 
 
+def test_one_frame_a_scene_is_shown_while_there_are_scenes():
+    frames = [
+        replace(flat_frame(f"{scene}{error}", [[error] * 3] * 2, [[0] * 3] * 2), scene=scene)
+        for scene, error in (("a", 1.0), ("a", 9.0), ("a", 8.0), ("b", 2.0), ("b", 7.0), ("c", 0.5))
+    ]
+    few = evaluate(frames, [Regressor()], EvaluationOptions(first_panels=2, worst_panels=2))
+    assert [panel.frame.name for panel in few.first] == ["a1.0", "b2.0"]
+    assert [panel.frame.name for panel in few.worst] == ["a9.0", "b7.0"]
+    many = evaluate(frames, [Regressor()], EvaluationOptions(first_panels=5, worst_panels=5))
+    assert [panel.frame.name for panel in many.first] == ["a1.0", "a9.0", "a8.0", "b2.0", "c0.5"]
+    assert [panel.frame.name for panel in many.worst] == ["a9.0", "b7.0", "c0.5"]
+
+
 def test_other_confidences_are_compared():
     frame = toy_frame(0)
     error = np.abs(frame.disparity - frame.truth)

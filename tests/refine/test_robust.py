@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from refine import MRFParameters, refine_disparity, solve_mrf
+from refine.baselines.ours_robust import OursRobust
 from refine.methods import known_methods
 from refine.robust import gradient_factor, solve_robust
 from tests.refine.oracles import robust_minimiser
@@ -79,9 +80,13 @@ def test_a_step_that_the_image_does_not_show_stays_a_step():
 def test_the_method_is_the_function():
     frame = toy_frame(1)
     method = known_methods()["ours_robust"]()
+    assert isinstance(method, OursRobust)
     found = method.run(frame).disparity
     assert found is not None
-    expected = solve_robust(frame.disparity, frame.confidence, frame.gradient, frame.image)
+    assert frame.confidence is not None
+    assert frame.gradient is not None
+    trust = method.shape.apply(frame.confidence)
+    expected = solve_robust(frame.disparity, trust, frame.gradient, frame.image, method.parameters)
     np.testing.assert_array_equal(found, expected.disparity.astype(np.float32))
 
 

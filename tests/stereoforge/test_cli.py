@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -73,6 +76,27 @@ def test_the_module_and_the_script_are_one_program() -> None:
     done = subprocess.run([sys.executable, "-m", "stereoforge", "--help"], capture_output=True, text=True)
     assert done.returncode == 0
     assert set(COMMANDS) <= set(done.stdout.replace(",", " ").split()) | {"verify"}
+
+
+def test_the_version_is_told() -> None:
+    done = subprocess.run([sys.executable, "-m", "stereoforge", "--version"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, f"stereoforge {version('stereoforge')}\n")
+
+
+@pytest.mark.parametrize("command", ["--help", "render"])
+def test_an_interruption_while_it_starts_is_no_traceback(command: str, tmp_path: Path) -> None:
+    """Imports take seconds, and are interrupted where `tyro` is asked for first."""
+    (tmp_path / "tyro.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "stereoforge", command],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path.cwd())])},
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.default_int_handler),
+    )
+    assert done.returncode == 130
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert "interrupted" in done.stderr
 
 
 def test_wrong_flags_exit_with_2(tmp_path: Path, refused: Callable[..., str]) -> None:
@@ -226,6 +250,7 @@ def test_refine_says_what_is_wrong_with_its_inputs(
     assert "40x30" in refused(1, "refine", left, small, *common)
     weightless = ("--weights", tmp_path / "nothing", "--out", tmp_path / "r")
     assert "nothing" in refused(1, "refine", left, left, *weightless)
+    assert "is a file, not a folder" in refused(2, "refine", left, left, "--out", small)
     assert "without --robust" in refused(2, "refine", left, left, *common, "--robust", "--form", "paper")
     part = tmp_path / "part"
     part.mkdir()

@@ -275,6 +275,18 @@ def test_mixed_precision_is_nearly_the_same_run(data: Path, tmp_path: Path) -> N
     assert all(tensor.dtype in (torch.float32, torch.int64) for tensor in stored.values())
 
 
+def test_a_run_is_resumed_whatever_its_data_set_is_called(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=5, progress=False)
+    monkeypatch.chdir(data.parent)
+    (tmp_path / "regressor.safetensors").unlink()
+    again = [(data.name, 1.0)]
+    train("regressor", again, tmp_path, quick_regressor(), steps=5, resume=True, progress=False)
+    with pytest.raises(TrainingError, match=r"with another data \(.*1.0.*, not .*2.0.*\), so it cannot"):
+        train("regressor", [(data, 2.0)], tmp_path, quick_regressor(), steps=5, resume=True, progress=False)
+
+
 def test_killed_before_the_first_checkpoint(data: Path, tmp_path: Path) -> None:
     """Weights without a checkpoint: --resume starts the same run anew instead of refusing it."""
     train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, progress=False)
@@ -367,7 +379,7 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
         train("confnet", source, tmp_path / "empty", quick("confnet"), progress=False)
     with pytest.raises(TrainingError, match="already holds a regressor; continue it with --resume"):
         train("regressor", source, run, quick_regressor(), steps=6, progress=False)
-    with pytest.raises(TrainingError, match="started with another steps"):
+    with pytest.raises(TrainingError, match=r"started with another steps \(6, not 7\)"):
         train("regressor", source, run, quick_regressor(), steps=7, resume=True, progress=False)
     with (
         alone(run / "logs" / "regressor" / ".lock"),

@@ -102,7 +102,7 @@ class StereoTask(pl.LightningModule):
     def _measure_statistics(self, norms: Sequence[_BatchNorm]) -> None:
         """Give BatchNorm the mean of many batches' statistics in place of a trace of the last few, by which
         validation errors swing (Wu and Johnson, "Rethinking 'Batch' in BatchNorm", 2021)."""
-        data = self.trainer.datamodule  # type: ignore[attr-defined]
+        data = self.trainer.datamodule
         batches = data.block(self.trainer.current_epoch, self.trainer.global_rank, self.trainer.world_size)
         momenta = [norm.momentum for norm in norms]
         for norm in norms:
