@@ -5,6 +5,7 @@ Numpy arrays in and out; knows nothing of data sets, networks or the refinement,
 
 from matching.consistency import INCONSISTENT, left_right_consistency
 from matching.holes import fill_background, fill_nearest
+from matching.order import seem_swapped
 from matching.sgbm import SGBMParameters, match_both, match_sgbm
 
 __all__ = [
@@ -15,4 +16,5 @@ __all__ = [
     "left_right_consistency",
     "match_both",
     "match_sgbm",
+    "seem_swapped",
 ]

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from datagen import Recipe
 from datagen.gallery import write_gallery
+from refine.bootstrap import FEWEST_SCENES
 from refine.evaluation import Evaluation
 from refine.results import EvaluatedSet
 from refine.settings import Settings
@@ -32,6 +33,7 @@ from storage import write_text
 from training.train import train
 
 NETWORKS = ("regressor", "confnet", "gradnet", "regressor_f")
+TOO_FEW = " They are too few for error bars."
 SHIPPED_METHODS = ("regressor", "gradnet", "ours", "ours_conf_gt")
 """What is run with the shipped networks, to show what more training brings."""
 
@@ -75,20 +77,20 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
     plan = plan or DemoPlan()
     clock = _Clock(out / "seconds.txt")
     data, weights = out / "data", out / "weights"
-    with clock, _stage(f"rendering {sum(plan.scenes.values()) * plan.world.frames} stereo pairs"):
+    with clock.stage(f"rendering {sum(plan.scenes.values()) * plan.world.frames} stereo pairs"):
         render_all(Recipe(plan.world, plan.scenes, samples=plan.samples), data)
     gallery = out / "gallery.html"
-    with clock, _stage("making the gallery"):
+    with clock.stage("making the gallery"):
         write_gallery(data, gallery, scenes=plan.gallery_scenes)
     for network in NETWORKS:
-        with clock, _stage(f"training the {network}, {plan.steps[network]} steps"):
+        with clock.stage(f"training the {network}, {plan.steps[network]} steps"):
             train(network, [(data, 1.0)], weights, "tiny", steps=plan.steps[network], resume=True)
     (test,) = open_test_data([str(data)], "test")
     # There is no time to choose parameters here; the shipped ones were chosen on a validation set of such worlds.
     settings = open_settings(None, SHIPPED_WEIGHTS)
-    with clock, _stage(f"refining and evaluating {len(test.frames)} test pairs"):
+    with clock.stage(f"refining and evaluating {len(test.frames)} test pairs"):
         evaluated = evaluate_set(test, open_predictors(weights), settings.rows())
-    with clock, _stage("the same with the networks that come with StereoForge"):
+    with clock.stage("the same with the networks that come with StereoForge"):
         shipped = _evaluate_shipped(test, settings)
     minutes = clock.seconds / 60
     files = report_evaluation(
@@ -119,21 +121,18 @@ class _Clock:
         except (OSError, ValueError):
             self.seconds = 0.0
 
-    def __enter__(self) -> None:
-        self._started = time.monotonic()
-
-    def __exit__(self, *_: object) -> None:
-        self.seconds += time.monotonic() - self._started
-        write_text(self._path, f"{self.seconds:.0f}\n")
-
-
-@contextmanager
-def _stage(title: str) -> Iterator[None]:
-    """Say what is being done, and how long it took."""
-    started = time.monotonic()
-    console.print(f"{title} ...")
-    yield
-    console.print(f"    {time.monotonic() - started:.0f} s")
+    @contextmanager
+    def stage(self, title: str) -> Iterator[None]:
+        """Say what is being done, and how long it took; what was interrupted counts, too."""
+        started = time.monotonic()
+        console.print(f"{title} ...")
+        try:
+            yield
+        finally:
+            passed = time.monotonic() - started
+            self.seconds += passed
+            write_text(self._path, f"{self.seconds:.0f}\n")
+        console.print(f"    {passed:.0f} s")
 
 
 def _limits(plan: DemoPlan, minutes: float) -> tuple[str, ...]:
@@ -147,7 +146,7 @@ def _limits(plan: DemoPlan, minutes: float) -> tuple[str, ...]:
         "The paper trained on 22,390 pairs of 960x540 for days on a GPU. Expect its error pattern here (halos "
         "around objects, which the MRF removes), not its accuracy.",
         f"The {pairs['test']} test pairs come from {scenes['test']} other scenes: they share no scene, mesh or "
-        "texture with the training set. They are too few for error bars.",
+        "texture with the training set." + TOO_FEW * (scenes["test"] < FEWEST_SCENES),
     )
 
 

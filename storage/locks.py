@@ -21,14 +21,16 @@ def locked(path: Path, *, shared: bool = False) -> Iterator[None]:
 
 
 @contextmanager
-def alone(path: Path) -> Iterator[None]:
-    """Hold the lock of a file, which is made; raises BlockingIOError at once where another process holds it."""
+def alone(path: Path, otherwise: Exception | None = None) -> Iterator[None]:
+    """Hold the lock of a file, which is made; where another process holds it raise `otherwise` at once, or
+    BlockingIOError."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise BlockingIOError(error.errno, "another process holds the lock", str(path)) from None
+            held = BlockingIOError(error.errno, "another process holds the lock", str(path))
+            raise otherwise or held from None
         except OSError:
             pass
         yield

@@ -2,12 +2,12 @@
 
 `full` is the published training: METHOD's DispNetCorr1D, ConfNet and GradNet. `small` (about 2.7 million
 parameters, a 11 MB file) and `tiny` (for minutes on a laptop's CPU) change what short runs on few pairs need
-changed, all of it here: BatchNorm, a one-sided correlation, predictions in units of 16 px, a larger learning rate
-with warm-up and a cosine end, gradient clipping, a compressed loss schedule, milder colour changes, flips, heads
-that work at the features' half resolution and also see matching costs around the disparity, how the disparity lies in
-its surroundings and, for GradNet, their slopes (`training.networks.evidence`), since the features of a small regressor
-hold too little of these; and, in `small`, some of the heads' crops are sheared into slants, and GradNet looks further
-around (dilations; docs/ablations.md).
+changed, all of it here: BatchNorm (its statistics fixed towards the end of a regressor's run), a one-sided
+correlation, predictions in units of 16 px, a larger learning rate with warm-up and a cosine end, gradient clipping, a
+compressed loss schedule, milder colour changes, flips, heads that work at the features' half resolution and also see
+matching costs around the disparity, how the disparity lies in its surroundings and, for GradNet, their slopes
+(`training.networks.evidence`), since the features of a small regressor hold too little of these; and, in `small`,
+some of the heads' crops are sheared into slants, and GradNet looks further around (dilations; docs/ablations.md).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import logging
 import signal
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -152,18 +152,18 @@ def train(
         "processes": process_count(),
         "refinement": None if refinement is None else asdict(refinement),
     }
-    module = StereoDataModule(sources, held_out, preset, steps, seed, workers, cache_bytes)
-    summary = TrainingSummary(
-        preset_name,
-        steps,
-        seed,
-        tuple((str(source), weight) for source, weight in data),
-        best_step=0,
-        fingerprints=tuple(source.fingerprint for source in sources),
-        revision=code_revision(),
-    )
     with _only_writer(out, task), _quiet_lightning(), _interruptible(), torch.random.fork_rng():
-        checkpoint = _prepare(out, task, resume, settings)
+        checkpoint = _prepare(out, task, resume, settings)  # before any frame is decoded
+        module = StereoDataModule(sources, held_out, preset, steps, seed, workers, cache_bytes)
+        summary = TrainingSummary(
+            preset_name,
+            steps,
+            seed,
+            tuple((str(source), weight) for source, weight in data),
+            best_step=0,
+            fingerprints=tuple(source.fingerprint for source in sources),
+            revision=code_revision(),
+        )
         torch.manual_seed(seed)
         lightning_task, regressor_sha256 = _build_task(preset, module, out, init, refinement, steps, seed)
         if hardware["accelerator"] == "cpu" or precision != "32" or not torch.cuda.is_available():
@@ -214,18 +214,14 @@ def _kept_networks(task: str, lightning_task: StereoTask) -> dict[str, Any]:
     return dict(zip(written_by(task), parts, strict=True))
 
 
-@contextmanager
-def _only_writer(out: Path, task: str) -> Iterator[None]:
+def _only_writer(out: Path, task: str) -> AbstractContextManager[None]:
     """Keep a second run out of the folder: it would write over the first one's checkpoints and weights."""
-    with ExitStack() as stack:
-        if process_rank() == 0:  # torchrun's other processes write nothing
-            try:
-                stack.enter_context(alone(out / "logs" / task / LOCK))
-            except BlockingIOError:
-                raise TrainingError(
-                    f"{out}: another process is training its {task} right now; wait for it, or choose another folder"
-                ) from None
-        yield
+    if process_rank() > 0:  # torchrun's other processes write nothing
+        return nullcontext()
+    busy = TrainingError(
+        f"{out}: another process is training its {task} right now; wait for it, or choose another folder"
+    )
+    return alone(out / "logs" / task / LOCK, busy)
 
 
 def _prepare(out: Path, task: str, resume: bool, settings: dict[str, Any]) -> Path | None:

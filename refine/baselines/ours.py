@@ -38,22 +38,12 @@ class Ours(Method):
     tolerance: float = DEFAULT_TOLERANCE
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
-        solution = self.solve(*self._inputs(frame))
+        solution = self.solve(*mrf_inputs(self, frame))
         return MethodOutput(disparity=solution.disparity.astype(np.float32))
 
     def deviation(self, frame: EvaluationFrame, samples: int) -> NDArray[np.float32]:
         """The posterior's standard deviation in pixels, of the exact form; sampling takes a solve each."""
-        return self.sample(*self._inputs(frame), samples)
-
-    def _inputs(
-        self, frame: EvaluationFrame
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
-        """What `solve` and `sample` take of a frame."""
-        if frame.confidence is None or frame.gradient is None:
-            raise ValueError(
-                f"{self.label} needs {self.lacks(frame)}, which frame {frame.name} comes without"
-            )
-        return frame.disparity, frame.confidence, frame.gradient, frame.image
+        return self.sample(*mrf_inputs(self, frame), samples)
 
     def sample(
         self,
@@ -87,3 +77,14 @@ class Ours(Method):
             self.solver,
             self.tolerance,
         )
+
+
+def mrf_inputs(
+    method: Method, frame: EvaluationFrame
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
+    """What a method with the MRF's inputs takes of a frame; ValueError if it lacks one of them."""
+    if frame.confidence is None or frame.gradient is None:
+        raise ValueError(
+            f"{method.label} needs {method.lacks(frame)}, which frame {frame.name} comes without"
+        )
+    return frame.disparity, frame.confidence, frame.gradient, frame.image

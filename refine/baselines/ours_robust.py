@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from refine.baselines.ours import mrf_inputs
 from refine.confidence_shape import ConfidenceShape
 from refine.methods import EvaluationFrame, Method, MethodOutput
 from refine.mrf import DEFAULT_TOLERANCE, MRFSolution, SolverName
@@ -45,9 +46,7 @@ class OursRobust(Method):
     tolerance: float = DEFAULT_TOLERANCE
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
-        assert frame.confidence is not None
-        assert frame.gradient is not None
-        solution = self.solve(frame.disparity, frame.confidence, frame.gradient, frame.image)
+        solution = self.solve(*mrf_inputs(self, frame))
         return MethodOutput(disparity=solution.disparity.astype(np.float32))
 
     def solve(

@@ -163,7 +163,7 @@ def _doubts(given: NDArray[np.float32] | None, confidence: NDArray[np.float32]) 
 
 
 def _doubtful_views(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> list[str]:
-    from matching.order import seem_swapped
+    from matching import seem_swapped
 
     if not seem_swapped(left, right):
         return []

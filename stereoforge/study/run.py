@@ -7,8 +7,7 @@ every other command takes them), `evaluations/`, `statistics/`, and `results/`, 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -64,7 +63,11 @@ def run_study(
         CommandError, DatasetError, TrainingError: What its steps raise.
     """
     study = _Study(plan, out, presets, device)
-    with _only_writer(out):
+    busy = CommandError(
+        f"{out}: another process is at this study right now; wait for it, or choose another folder"
+    )
+    # Two would do each step, into the same files.
+    with alone(out / LOCK, busy):
         run_jobs(study.jobs)
         return write_results(
             plan,
@@ -76,19 +79,6 @@ def run_study(
             },
             weights=study.runs[plan.subject].folder,
         )
-
-
-@contextmanager
-def _only_writer(out: Path) -> Iterator[None]:
-    """Keep a second study out of the folder: both would do each step, into the same files."""
-    with ExitStack() as stack:
-        try:
-            stack.enter_context(alone(out / LOCK))
-        except BlockingIOError:
-            raise CommandError(
-                f"{out}: another process is at this study right now; wait for it, or choose another folder"
-            ) from None
-        yield
 
 
 FOREST = "rdf"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from matching.order import seem_swapped
+from matching import seem_swapped
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -141,8 +141,11 @@ def test_multigrid_agrees_with_the_dense_solution_however_little_is_known(
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         solution = solve_mrf(*problem.inputs, form=form, solver="multigrid", tolerance=1e-9)
-    # Coefficients are rounded to float32, and what ties pixels together is up to 10^5 times what holds them.
-    np.testing.assert_allclose(solution.disparity, expected, rtol=0, atol=1e-2)
+    # Coefficients are rounded to float32, and what ties pixels together is up to 10^5 times what holds them. The
+    # paper's form was seen off by 0.0029 in one case, the one above.
+    np.testing.assert_allclose(
+        solution.disparity, expected, rtol=0, atol={"exact": 2e-3, "paper": 5e-3}[form]
+    )
 
 
 @pytest.mark.parametrize("style", ["blocks", "constant", "noise"])
