@@ -10,6 +10,8 @@ from training.networks import DispNetConfig
 from training.presets import RegressorPreset, find_preset
 from training.train import train
 
+VALIDATION_INTERVAL = 5  # steps; also between checkpoints
+
 
 def preset_of(crops: int) -> RegressorPreset:
     """The full preset but for its size: no normalisation layer, all stages of the loss."""
@@ -20,7 +22,7 @@ def preset_of(crops: int) -> RegressorPreset:
         batch_size=crops,
         crop_width=128,
         crop_height=64,
-        validation_interval=5,
+        validation_interval=VALIDATION_INTERVAL,
         network=DispNetConfig(width=0.0625),
     )
 

@@ -9,10 +9,10 @@ import pytest
 import safetensors.torch
 import torch
 
-from tests.training.short_run import run
+from tests.training.short_run import VALIDATION_INTERVAL, run
 from tests.training.synthetic import write_dataset
 
-STEPS, KILLS = 40, 5
+STEPS, KILLS = 60, 4
 
 
 @pytest.mark.slow
@@ -32,14 +32,20 @@ def test_killed_at_random_moments(tmp_path: Path) -> None:
     began = time.monotonic()
     whole_again = start(tmp_path / "whole-again")
     whole_again.join()
-    length = time.monotonic() - began
+    between_checkpoints = (time.monotonic() - began) / (STEPS / VALIDATION_INTERVAL)
     assert whole.exitcode == whole_again.exitcode == 0
 
+    # Moments counted from the run's own checkpoints, of which it has twelve: a machine that has
+    # become several times faster or slower since the whole runs still kills within the run.
     rng = random.Random(0)
+    checkpoint = tmp_path / "killed" / "logs" / "regressor" / "last.ckpt"
     kills = 0
     while kills < KILLS:
+        before = written(checkpoint)
         process = start(tmp_path / "killed")
-        process.join(rng.uniform(0.2, 0.8) * length)
+        while process.is_alive() and written(checkpoint) == before:
+            time.sleep(0.005)
+        process.join(rng.random() * between_checkpoints)
         if process.exitcode is not None:
             assert process.exitcode == 0
             break  # whole before the next kill
@@ -57,3 +63,11 @@ def test_killed_at_random_moments(tmp_path: Path) -> None:
         assert all(torch.equal(expected[key], got[key]) for key in expected)
     checkpoints = list((tmp_path / "killed" / "logs" / "regressor").glob("*.ckpt"))
     assert [path.name for path in checkpoints] == ["last.ckpt"]
+
+
+def written(checkpoint: Path) -> int:
+    """When the checkpoint was last replaced, in nanoseconds; 0 while there is none."""
+    try:
+        return checkpoint.stat().st_mtime_ns
+    except FileNotFoundError:
+        return 0
