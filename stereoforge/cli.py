@@ -8,13 +8,18 @@ import re
 import signal
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
-from stereoforge.commands import COMMANDS, after_interruption, command_class
+from stereoforge.commands import COMMANDS, after_interruption, command_class, command_summary
 from stereoforge.errors import CommandError, UsageError
 
 DEBUG_FLAG = "--debug"
+DESCRIPTION = (
+    "Make stereo training sets in Blender, train stereo networks on them, refine disparity.\n\n"
+    f"Every command has --help, and takes {DEBUG_FLAG} to show where a failure came from. --version says which this is."
+)
 MISSING_PARTS = {
     "bpy": "rendering needs Blender: pip install 'stereoforge[render]' on Python 3.11 (bpy 4.5) or 3.13 (bpy 5.2)",
     "torch": "networks need PyTorch: pip install torch, then pip install 'stereoforge[train]'",
@@ -70,10 +75,11 @@ def _parse(words: Sequence[str]) -> Any:
             if words and words[0] in COMMANDS:
                 found = command_class(words[0])
                 return tyro.cli(found, prog=f"stereoforge {words[0]}", args=words[1:], **settings)
+            # No command: help or a complaint, for neither of which all of them have to be imported.
             return tyro.extras.subcommand_cli_from_dict(
-                {name: command_class(name) for name in COMMANDS},
+                {name: dataclass(type(name, (), {"__doc__": command_summary(name)})) for name in COMMANDS},
                 prog="stereoforge",
-                description="Make stereo training sets in Blender, train stereo networks on them, refine disparity.",
+                description=DESCRIPTION,
                 args=words,
                 **settings,
             )

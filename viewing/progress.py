@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from datetime import timedelta
 from typing import Any
 
 from rich.console import Console
@@ -71,7 +72,8 @@ class JobProgress(Progress):
         line = ", ".join(text.format(task=task) for text in self._texts)
         elapsed, left = task.elapsed, task.time_remaining
         if elapsed is not None and left is not None:
-            line += f"; {duration(elapsed)} gone, about {duration(left)} left"
+            # As the bar writes it: two lines half a minute apart are not to say the same.
+            line += f"; {timedelta(seconds=round(elapsed))} gone, about {duration(left)} left"
         self.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 

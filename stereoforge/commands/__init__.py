@@ -3,7 +3,10 @@
 A command's module is imported when it is asked for: together they bring along half a dozen libraries.
 """
 
+import ast
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Protocol
 
 COMMANDS = {
@@ -31,9 +34,23 @@ class Command(Protocol):
 
 def command_class(name: str) -> type[Command]:
     """The dataclass of one of `COMMANDS`."""
-    module = import_module(f"stereoforge.commands.{name.replace('-', '_')}")
-    found: type[Command] = getattr(module, COMMANDS[name])
+    found: type[Command] = getattr(import_module(_module(name)), COMMANDS[name])
     return found
+
+
+def command_summary(name: str) -> str:
+    """What one of `COMMANDS` does: how the docstring of its class begins, without importing its module."""
+    spec = find_spec(_module(name))
+    assert spec is not None
+    assert spec.origin is not None
+    for node in ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ClassDef) and node.name == COMMANDS[name]:
+            return (ast.get_docstring(node) or "").split("\n\n")[0]
+    raise AssertionError(f"no class {COMMANDS[name]} in {spec.origin}")
+
+
+def _module(name: str) -> str:
+    return f"stereoforge.commands.{name.replace('-', '_')}"
 
 
 def after_interruption(command: Any) -> str:

@@ -24,7 +24,7 @@ from refine.methods import known_methods
 from refine.settings import read_settings
 from refine.tuning import measure
 from stereoforge.cli import main
-from stereoforge.commands import COMMANDS
+from stereoforge.commands import COMMANDS, command_class, command_summary
 from stereoforge.demo import DemoPlan, DemoResult, run_demo
 from stereoforge.prediction import open_predictors
 
@@ -76,6 +76,18 @@ def test_the_module_and_the_script_are_one_program() -> None:
     done = subprocess.run([sys.executable, "-m", "stereoforge", "--help"], capture_output=True, text=True)
     assert done.returncode == 0
     assert set(COMMANDS) <= set(done.stdout.replace(",", " ").split()) | {"verify"}
+
+
+def test_the_list_of_commands_imports_none_of_them() -> None:
+    ask = "import sys; from stereoforge.cli import main\ntry: main(['--help'])\nfinally: print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True)
+    assert done.returncode == 0
+    *_, modules = done.stdout.strip().splitlines()
+    assert not {"numpy", "torch", "bpy", "stereoforge.commands.render"} & set(modules.split())
+    for name in COMMANDS:
+        summary = command_summary(name)
+        assert summary
+        assert (command_class(name).__doc__ or "").startswith(summary)
 
 
 def test_the_version_is_told() -> None:

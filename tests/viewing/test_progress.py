@@ -43,7 +43,7 @@ def test_a_log_gets_a_line_now_and_then(seconds: list[float]) -> None:
     job(out, seconds, terminal=False)
     lines = out.getvalue().splitlines()
     assert lines[0].startswith("training: 2 of 20, loss 0.50")
-    assert lines[4] == "training: 10 of 20, loss 0.10; 3 min gone, about 3 min left"
+    assert lines[4] == "training: 10 of 20, loss 0.10; 0:03:20 gone, about 3 min left"
     assert len([line for line in lines if line.startswith("training: ")]) == 9
     assert "20 of 20" not in out.getvalue()
 
