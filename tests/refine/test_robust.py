@@ -20,7 +20,7 @@ MILD = MRFParameters(alpha=5.0, beta=0.1, sigma_r=20.0, confidence_floor=0.05)
 """Weights whose energy a quasi-Newton method gets to the bottom of."""
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     height=st.integers(2, 6),
     width=st.integers(2, 6),

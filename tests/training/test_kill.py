@@ -12,7 +12,7 @@ import torch
 from tests.training.short_run import VALIDATION_INTERVAL, run
 from tests.training.synthetic import write_dataset
 
-STEPS, KILLS = 60, 4
+STEPS, KILLS = 60, 5
 
 
 @pytest.mark.slow
