@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
-from refine.baselines.ours import Ours
+from refine.baselines.ours_quadratic import OursQuadratic
 from refine.baselines.regressor import Regressor
 from refine.evaluation import evaluate
 from refine.methods import Method
@@ -22,14 +22,14 @@ from training.predict import StereoPredictor
 
 
 @dataclass(frozen=True)
-class Paper(Ours):
+class Paper(OursQuadratic):
     """The same method, its other form a row of its own."""
 
     name: ClassVar[str] = "paper"
     label: ClassVar[str] = "Ours, as printed"
 
 
-def both_forms(ours: Ours) -> list[Method]:
+def both_forms(ours: OursQuadratic) -> list[Method]:
     fields = {"parameters": ours.parameters, "shape": ours.shape}
     return [replace(ours, form="exact"), Paper(form="paper", **fields)]  # type: ignore[arg-type]
 
@@ -44,14 +44,14 @@ def main() -> None:
     options = parser.parse_args()
     predictors = open_predictors(options.weights)
     assert isinstance(predictors.initial, StereoPredictor)
-    settings = {"default": Ours()}
+    settings = {"default": OursQuadratic()}
     if parameters_file(options.weights).exists():
-        settings["validated"] = open_settings(None, options.weights).ours
+        settings["validated"] = open_settings(None, options.weights).ours_quadratic
     print("| set | parameters | form | EPE, px | > 1 px, % | gradient, smooth | gradient, all | seconds |")
     print("|---|---|---|---|---|---|---|---|")
     for data in open_test_data(options.data, options.split):
         frames = [predictors.frame(frame) for frame in data.frames]
-        for method in both_forms(Ours()):
+        for method in both_forms(OursQuadratic()):
             method.run(frames[0])  # compiles
         for chosen, ours in settings.items():
             rows: list[Method] = both_forms(ours)
@@ -59,7 +59,7 @@ def main() -> None:
                 rows.insert(0, Regressor())
             scores = evaluate(frames, rows, evaluation_options(data.family)).scores
             for name, score in scores.items():
-                form = {"ours": "exact", "regressor": "not refined"}.get(name, name)
+                form = {"ours_quadratic": "exact", "regressor": "not refined"}.get(name, name)
                 region, seconds = score.regions["all"], "" if name == "regressor" else f"{score.seconds:.3f}"
                 print(
                     f"| {data.name} | {chosen if form != 'not refined' else ''} | {form} | {region.epe:.3f} "

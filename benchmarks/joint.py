@@ -19,7 +19,7 @@ from training.presets import find_preset
 from training.train import train
 from training.weights import has_weights
 
-METHODS = ("gradnet", "ours")
+METHODS = ("gradnet", "ours_quadratic")
 
 
 def further(options: argparse.Namespace, name: str, refined_weight: float) -> Path:
@@ -32,7 +32,7 @@ def further(options: argparse.Namespace, name: str, refined_weight: float) -> Pa
         find_preset("joint", options.preset),
         changes={"refined_weight": refined_weight},
         init=options.weights,
-        refinement=open_settings(None, options.weights).ours,
+        refinement=open_settings(None, options.weights).ours_quadratic,
         resume=has_weights(out, "confnet"),
         steps=options.steps,
         seed=options.seed,
@@ -43,7 +43,7 @@ def further(options: argparse.Namespace, name: str, refined_weight: float) -> Pa
 
 
 def row(tested: str, name: str, scores: dict[str, MethodScore], auc: float) -> str:
-    refined, gradnet = scores["ours"], scores["gradnet"]
+    refined, gradnet = scores["ours_quadratic"], scores["gradnet"]
     region = refined.regions["all"]
     numbers = f"{region.epe:.3f} | {region.bad * 100:.2f} | {refined.gradient_masked:.4f}"
     return f"| {tested} | {name} | {numbers} | {auc:.4f} | {gradnet.gradient_masked:.4f} |"

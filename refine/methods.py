@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 PAPER_FIRST = ("regressor", "regressor_f", "gradnet", "sgbm", "wmf", "color", "tgv", "fbs", "grad")
-PAPER_LAST = ("ours", "ours_conf_gt")
+PAPER_LAST = ("ours_quadratic", "ours", "ours_conf_gt")
 
 INPUTS_IN_WORDS = {
     "confidence": "a confidence",
@@ -109,9 +109,11 @@ class Method(ABC):
     """Whether it looks at the ground truth: no rival, but the room that is left."""
     needs: ClassVar[frozenset[str]] = frozenset()
     """Optional fields of `EvaluationFrame` the method cannot do without."""
-    search: ClassVar[Mapping[str, tuple[float | int | str, ...]]] = {}
+    search: ClassVar[Mapping[str, tuple[float | int | str | None, ...]]] = {}
     """What validation may choose from: for a field (`parameters.alpha` for a field of a record) its values in
     order, the default among them."""
+    tied: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Pairs of these that make up for one another, so that one of them alone can hardly be bettered."""
     follows: ClassVar[Mapping[str, str]] = {}
     """Fields that hold another method, by its name: they take that method's validated parameters."""
 

@@ -88,6 +88,9 @@ PAPER: dict[str, dict[str, PaperScore]] = {
 }
 """By data set, then by method."""
 
+SAME_IN_PAPER = {"ours_quadratic": "ours"}
+"""Rows of ours whose counterpart has another name in the paper."""
+
 KITTI_OTHERS: dict[str, PaperScore] = {
     "Displets": PaperScore(d1_bg=0.0300, d1_fg=0.0556, d1_all=0.0343),
     "Content-CNN": PaperScore(d1_bg=0.0373, d1_fg=0.0858, d1_all=0.0454),

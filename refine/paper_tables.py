@@ -12,11 +12,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from refine.bootstrap import REFERENCE, UNKNOWN, Bootstrap, Interval, bootstrap
-from refine.paper import KITTI_OTHERS, NAN, PAPER, PaperScore, counterpart
+from refine.paper import KITTI_OTHERS, NAN, PAPER, SAME_IN_PAPER, PaperScore, counterpart
 from refine.results import EvaluatedSet
 
-MAIN_ROWS = ("regressor", "wmf", "regressor_f", "ours")
-REFINEMENT_ROWS = ("color", "tgv", "fbs", "grad", "ours")
+MAIN_ROWS = ("regressor", "wmf", "regressor_f", "ours_quadratic", "ours")
+REFINEMENT_ROWS = ("color", "tgv", "fbs", "grad", "ours_quadratic", "ours")
 PAPER_ROWS = {*MAIN_ROWS, *REFINEMENT_ROWS, "gradnet", "ours_conf_gt"}
 
 
@@ -190,7 +190,7 @@ def _cell(
     scores, measure = each.evaluation.scores, column.measure
     value = scores[method].measures()[measure]
     base = scores[REFERENCE].measures()[measure] if REFERENCE in scores else NAN
-    paper = printed.get(method, PaperScore()).value(measure)
+    paper = printed.get(SAME_IN_PAPER.get(method, method), PaperScore()).value(measure)
     paper_base = printed.get(REFERENCE, PaperScore()).value(measure)
     return PaperCell(
         value=value,

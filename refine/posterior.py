@@ -9,6 +9,8 @@ together; probing the diagonal with random signs was tried and was off by half i
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -31,6 +33,7 @@ def posterior_deviation(
     parameters: MRFParameters = MRFParameters(),  # noqa: B008 - frozen
     samples: int = 32,
     seed: int = 0,
+    gradient_factor: Floats | None = None,
 ) -> NDArray[np.float32]:
     """Standard deviation of each refined disparity under the MRF's own Gaussian, exact form.
 
@@ -44,6 +47,8 @@ def posterior_deviation(
         parameters: The energy's weights.
         samples: Solves. The relative standard error of the result is 1 / sqrt(2 samples): 0.125 for 32.
         seed: Of the noise.
+        gradient_factor: (H, W, 2), by which the weights of the gradient terms are multiplied: for an energy that is
+            not quadratic, its curvature where it is least (`refine.robust.curvature_factor`).
 
     Returns:
         (H, W) float32.
@@ -55,6 +60,7 @@ def posterior_deviation(
     if samples < 1:
         raise ValueError(f"samples must be at least 1, got {samples}")
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
+    problem = replace(problem, gradient_factor=gradient_factor)
     parts = couplings_of(problem, data_weight(problem))
     system = GivenSystem(parts)
     rng = np.random.default_rng(seed)

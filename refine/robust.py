@@ -25,7 +25,6 @@ from refine.mrf import DEFAULT_TOLERANCE, MRFSolution, SolverName, checked_probl
 from refine.parameters import MRFParameters
 from refine.weights import Floats
 
-DEFAULT_SCALE = 0.3
 DEFAULT_REWEIGHTINGS = 4
 WEIGHING_TOLERANCE = 1e-4
 """Of all solves but the last, whose solutions only weigh the terms of the next."""
@@ -36,8 +35,8 @@ def solve_robust(
     confidence: ArrayLike,
     gradient: ArrayLike,
     image: ArrayLike,
-    parameters: MRFParameters = MRFParameters(),  # noqa: B008 - frozen
-    scale: float = DEFAULT_SCALE,
+    parameters: MRFParameters,
+    scale: float,
     reweightings: int = DEFAULT_REWEIGHTINGS,
     solver: SolverName = "auto",
     tolerance: float = DEFAULT_TOLERANCE,
@@ -62,8 +61,7 @@ def solve_robust(
         ValueError: If an input is wrong.
         refine.SolverError: If a system is singular.
     """
-    if not (np.isfinite(scale) and scale > 0):
-        raise ValueError(f"the gradient term's scale must be positive, got {scale}")
+    check_scale(scale)
     if reweightings < 0:
         raise ValueError(f"there cannot be {reweightings} reweightings")
     began = time.perf_counter()
@@ -80,6 +78,12 @@ def solve_robust(
     return MRFSolution(solution.disparity, info)
 
 
+def check_scale(scale: float) -> None:
+    """Raises ValueError unless it can be a scale of the gradient term."""
+    if not (np.isfinite(scale) and scale > 0):
+        raise ValueError(f"the gradient term's scale must be positive, got {scale}")
+
+
 def gradient_factor(disparity: Floats, gradient: Floats, scale: float) -> Floats:
     """1 / sqrt(1 + e^2 / scale^2), e the differences' deviations from the gradient; (H, W, 2), 1 where it has none."""
     off = np.zeros_like(gradient)
@@ -87,3 +91,10 @@ def gradient_factor(disparity: Floats, gradient: Floats, scale: float) -> Floats
     off[:-1, :, 1] = np.diff(disparity, axis=0) - gradient[:-1, :, 1]
     factor: Floats = 1 / np.sqrt(1 + np.square(np.nan_to_num(off, nan=0.0) / scale))
     return factor
+
+
+def curvature_factor(disparity: ArrayLike, gradient: ArrayLike, scale: float) -> Floats:
+    """psi''(e) / 2 = (1 + e^2 / scale^2)^(-3/2): how much the energy bends, as part of what the quadratic one does."""
+    depths, slopes = np.asarray(disparity, np.float64), np.asarray(gradient, np.float64)
+    curvature: Floats = gradient_factor(depths, slopes, scale) ** 3
+    return curvature

@@ -16,7 +16,7 @@ from typing import Any
 import cattrs
 
 from refine.baselines.ours import Ours
-from refine.baselines.ours_robust import OursRobust
+from refine.baselines.ours_quadratic import OursQuadratic
 from refine.methods import Method, default_methods, known_methods
 from refine.tuning import Trial, TunedMethod
 from storage import write_text
@@ -49,10 +49,10 @@ class Settings:
         return method
 
     @property
-    def ours_robust(self) -> OursRobust:
-        """The MRF with a robust gradient term."""
-        method = self.method(OursRobust.name)
-        assert isinstance(method, OursRobust)
+    def ours_quadratic(self) -> OursQuadratic:
+        """The MRF with the paper's energy."""
+        method = self.method(OursQuadratic.name)
+        assert isinstance(method, OursQuadratic)
         return method
 
     def rows(self, names: tuple[str, ...] = ()) -> tuple[Method, ...]:

@@ -105,7 +105,8 @@ def train(
         pseudo: folder of disparities (`training.pseudo`) to train on instead of the one data set's own truth.
         init: run folder with the regressor to start from (`regressor`: optional) or to build on (other tasks: `out`
             by default, and copied there). `joint`: the run folder whose three networks to start from, not `out`.
-        refinement: `joint`: what to train through; the MRF with its default parameters if None.
+        refinement: `joint`: what to train through, its gradient term quadratic; the MRF with its default parameters if
+            None.
         resume: continue from the last checkpoint, as if never interrupted; starts anew where there is none.
         steps: length of the run, the preset's by default; all its schedules are scaled to it.
         workers: processes that prepare crops; results do not depend on their number.
@@ -138,6 +139,10 @@ def train(
     logs = out / "logs" / task
     if isinstance(preset, JointPreset):
         refinement = refinement or Ours()
+        if refinement.gradient_scale is not None:
+            raise TrainingError(
+                "joint trains through the MRF with the paper's quadratic gradient term, not with a robust one"
+            )
     elif refinement is not None:
         raise TrainingError(f"only joint trains through a refinement, {task} does not")
     settings = {

@@ -1,4 +1,4 @@
-"""The paper's method: the continuous MRF over initial disparity, confidence and gradients."""
+"""Ours: the continuous MRF over initial disparity, confidence and gradients."""
 
 from __future__ import annotations
 
@@ -12,30 +12,53 @@ from refine.confidence_shape import ConfidenceShape
 from refine.methods import EvaluationFrame, Method, MethodOutput
 from refine.mrf import DEFAULT_TOLERANCE, MRFSolution, SolverName, solve_mrf
 from refine.parameters import MRFParameters
+from refine.robust import check_scale, curvature_factor, solve_robust
 from refine.system import Form
 
 
 @dataclass(frozen=True)
 class Ours(Method):
-    """The MRF with ConfNet's confidence and GradNet's gradient."""
+    """The MRF with ConfNet's confidence and GradNet's gradient; the defaults are the paper's.
+
+    Validation may choose the shape of the gradient term too: quadratic as the paper's (`ours_quadratic` is that
+    one's row), or robust (`refine.robust`), so that disparities may step where the image does not.
+    """
 
     name: ClassVar[str] = "ours"
     label: ClassVar[str] = "Ours"
     needs: ClassVar[frozenset[str]] = frozenset({"confidence", "gradient"})
     search: ClassVar = {
-        "parameters.sigma_r": (1.0, 1.7, 2.55, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0, 25.0, 40.0),
+        "parameters.sigma_r": (1.0, 1.7, 2.55, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0, 20.0, 25.0, 40.0),
         "shape.power": (0.5, 1.0, 2.0, 3.0, 4.0),
-        "parameters.alpha": (3.0, 10.0, 30.0, 50.0, 100.0, 300.0),
+        "parameters.alpha": (3.0, 10.0, 30.0, 50.0, 100.0, 300.0, 1000.0, 3000.0),
+        "gradient_scale": (None, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01),
         "parameters.beta": (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0),
         "shape.temperature": (0.5, 0.7, 1.0, 1.5),
         "parameters.confidence_floor": (1e-5, 1e-4, 1e-3, 3e-3, 1e-2),
     }
+    tied: ClassVar[tuple[tuple[str, str], ...]] = (
+        ("parameters.alpha", "gradient_scale"),
+        ("shape.power", "shape.temperature"),
+    )
+    """Far from the predicted gradients only alpha times the scale matters; where the confidence is low, only power over
+    temperature."""
 
     parameters: MRFParameters = field(default_factory=MRFParameters)
     shape: ConfidenceShape = field(default_factory=ConfidenceShape)
     form: Form = "exact"
     solver: SolverName = "auto"
     tolerance: float = DEFAULT_TOLERANCE
+    gradient_scale: float | None = None
+    """As `refine.robust.solve_robust`'s scale, in pixels a pixel; None for the paper's quadratic gradient term."""
+
+    def __post_init__(self) -> None:
+        if self.gradient_scale is None:
+            return
+        check_scale(self.gradient_scale)
+        if self.form != "exact":
+            raise ValueError(
+                "the paper's form of the MRF has a quadratic gradient term, so no gradient_scale"
+            )
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
         solution = self.solve(*mrf_inputs(self, frame))
@@ -53,11 +76,21 @@ class Ours(Method):
         image: NDArray[np.uint8],
         samples: int,
     ) -> NDArray[np.float32]:
-        """`refine.posterior.posterior_deviation` with this method's parameters, the confidence shaped."""
+        """`refine.posterior.posterior_deviation` with this method's parameters, the confidence shaped.
+
+        With a robust gradient term that of the Gaussian whose energy is curved as this one is at its minimum
+        (Laplace's approximation).
+        """
         from refine.posterior import posterior_deviation  # brings numba along
 
+        factor = None
+        if self.gradient_scale is not None:
+            refined = self.solve(disparity, confidence, gradient, image).disparity
+            factor = curvature_factor(refined, gradient, self.gradient_scale)
         shaped = self.shape.apply(confidence)
-        return posterior_deviation(disparity, shaped, gradient, image, self.parameters, samples)
+        return posterior_deviation(
+            disparity, shaped, gradient, image, self.parameters, samples, gradient_factor=factor
+        )
 
     def solve(
         self,
@@ -66,17 +99,11 @@ class Ours(Method):
         gradient: NDArray[np.float32],
         image: NDArray[np.uint8],
     ) -> MRFSolution:
-        """`refine.solve_mrf` with this method's parameters, the confidence shaped."""
-        return solve_mrf(
-            disparity,
-            self.shape.apply(confidence),
-            gradient,
-            image,
-            self.parameters,
-            self.form,
-            self.solver,
-            self.tolerance,
-        )
+        """`refine.solve_mrf`, or `refine.robust.solve_robust`, with this method's parameters, the confidence shaped."""
+        inputs = disparity, self.shape.apply(confidence), gradient, image, self.parameters
+        if self.gradient_scale is None:
+            return solve_mrf(*inputs, self.form, self.solver, self.tolerance)
+        return solve_robust(*inputs, self.gradient_scale, solver=self.solver, tolerance=self.tolerance)
 
 
 def mrf_inputs(

@@ -61,11 +61,9 @@ class Refine:
     """What predicts the disparity: the run folder's networks, or OpenCV's semi-global matching."""
     parameters: Annotated[Path | None, shown("FILE", "the run folder's, if it has one")] = None
     """The MRF's parameters, as `stereoforge tune` writes them."""
-    form: Annotated[Literal["exact", "paper"] | None, shown("exact|paper", "as validated, else exact")] = None
-    """exact minimises the energy; paper solves the paper's eq. 8 as printed."""
-    robust: bool = False
-    """Refine by ours_robust instead of the paper's MRF: disparities may step where the image does not; takes five
-    solves."""
+    form: Annotated[Literal["exact", "paper"] | None, shown("exact|paper", "ours, as validated")] = None
+    """Refine by the paper's MRF, whose gradient term is quadratic: exact minimises its energy, paper solves its eq. 8
+    as printed."""
     deviation: bool = False
     """Also write deviation.pfm, the refined disparity's standard deviation in pixels under the MRF's own Gaussian (of
     the exact form): its order, least sure last, is what it is good for. Takes 32 more solves."""
@@ -85,8 +83,9 @@ class Refine:
             given = read_disparity(self.disparity, size), other
         elsewhere: Literal["networks", "sgbm"] = "sgbm" if given is not None else self.predictor
         settings = open_settings(self.parameters, self.weights, elsewhere)
-        ours = settings.ours if self.form is None else replace(settings.ours, form=self.form)
-        method = settings.ours_robust if self.robust else ours
+        method = settings.ours
+        if self.form is not None:
+            method = replace(settings.ours_quadratic, form=self.form)
         prediction, notes = predict_pair(left, right, given, self.weights, self.device, self.predictor)
         assert prediction.confidence is not None
         assert prediction.gradient is not None
@@ -94,7 +93,7 @@ class Refine:
             solution = method.solve(prediction.disparity, prediction.confidence, prediction.gradient, left)
         deviation = None
         if self.deviation:
-            deviation = ours.sample(
+            deviation = method.sample(
                 prediction.disparity, prediction.confidence, prediction.gradient, left, POSTERIOR_SAMPLES
             )
         self._write(left, prediction, solution, deviation)
@@ -114,8 +113,6 @@ class Refine:
             raise UsageError("--disparity-right goes with --disparity")
         if self.out.exists() and not self.out.is_dir():
             raise UsageError(f"--out {self.out}: is a file, not a folder")
-        if self.robust and (self.form is not None or self.deviation):
-            raise UsageError("--form and --deviation are of the paper's MRF, without --robust")
 
     def _write(
         self,

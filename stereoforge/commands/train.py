@@ -109,7 +109,9 @@ class Train:
             changes=self._changes(),
             pseudo=self.pseudo,
             init=self.init,
-            refinement=open_settings(None, self.init).ours if self.task == "joint" and self.init else None,
+            refinement=open_settings(None, self.init).ours_quadratic
+            if self.task == "joint" and self.init
+            else None,
             resume=self.resume,
             steps=self.steps,
             seed=self.seed,

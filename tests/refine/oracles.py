@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from scipy.optimize import minimize
@@ -72,8 +73,10 @@ def dense_minimiser(problem: Problem, parameters: MRFParameters) -> np.ndarray:
     return np.linalg.lstsq(matrix, wanted, rcond=None)[0].reshape(problem.disparity.shape)
 
 
-def robust_minimiser(problem: Problem, parameters: MRFParameters, scale: float) -> np.ndarray:
-    """argmin of E with Charbonnier's penalty for the gradient terms, by quasi-Newton steps on E itself."""
+def robust_energy(
+    problem: Problem, parameters: MRFParameters, scale: float
+) -> Callable[[np.ndarray], tuple[float, np.ndarray]]:
+    """E with Charbonnier's penalty for the gradient terms, and its slope, of a disparity map in reading order."""
     terms = energy_terms(problem, parameters)
     matrix = np.zeros((len(terms), problem.disparity.size))
     weights, wanted, robust = (np.zeros(len(terms)) for _ in range(3))
@@ -91,8 +94,13 @@ def robust_minimiser(problem: Problem, parameters: MRFParameters, scale: float) 
         slope = np.where(robust, 2 * off / root, 2 * off)
         return float(weights @ penalty), matrix.T @ (weights * slope)
 
+    return energy
+
+
+def robust_minimiser(problem: Problem, parameters: MRFParameters, scale: float) -> np.ndarray:
+    """argmin of `robust_energy`, by quasi-Newton steps on it."""
     found = minimize(
-        energy,
+        robust_energy(problem, parameters, scale),
         problem.disparity.ravel(),
         jac=True,
         method="L-BFGS-B",

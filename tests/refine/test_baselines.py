@@ -26,7 +26,7 @@ from refine.baselines.tgv import TGV
 from refine.baselines.wmf import WMF, weighted_median
 from refine.confidence_shape import ConfidenceShape
 from refine.evaluation import EvaluationFrame, evaluate
-from refine.methods import known_methods
+from refine.methods import default_methods, known_methods
 from tests.refine.oracles import dense_minimiser
 from tests.refine.worlds import random_problem, toy_frame
 from tests.training.synthetic import random_pair
@@ -345,20 +345,26 @@ def test_every_method_runs_on_a_frame_and_is_timed():
     assert evaluation.skipped == {}
     assert set(evaluation.scores) == {
         *("regressor", "regressor_f", "gradnet", "sgbm", "wmf", "color", "tgv", "fbs", "grad", "ours"),
-        *("ours_conf_gt", "ours_robust"),
+        *("ours_conf_gt", "ours_quadratic"),
     }
     assert all(score.seconds > 0 for score in evaluation.scores.values())
     assert evaluation.scores["regressor"].seconds == pytest.approx(2.0, abs=0.1)
     assert evaluation.scores["regressor_f"].seconds == pytest.approx(3.0, abs=0.1)
     assert evaluation.scores["regressor_f"].regions["all"].epe == pytest.approx(0.25)
     before = evaluation.scores["regressor"].regions["all"].epe
-    for name in ("color", "tgv", "fbs", "grad", "ours", "ours_conf_gt", "ours_robust"):
+    for name in ("color", "tgv", "fbs", "grad", "ours", "ours_conf_gt", "ours_quadratic"):
         assert evaluation.scores[name].regions["all"].epe < before, name
 
 
-@pytest.mark.parametrize("name", ["wmf", "color", "tgv", "fbs", "grad", "ours", "ours_robust"])
-def test_holes_and_tiny_images_are_taken(name):
-    method = known_methods()[name]()
+@pytest.mark.parametrize(
+    "method",
+    [
+        *default_methods(("wmf", "color", "tgv", "fbs", "grad", "ours_quadratic")),
+        Ours(gradient_scale=0.1),
+    ],
+    ids=lambda method: method.name,
+)
+def test_holes_and_tiny_images_are_taken(method):
     frame = full_frame()
     disparity = frame.disparity.copy()
     disparity[5:9, 10:60] = np.nan

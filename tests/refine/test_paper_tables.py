@@ -24,7 +24,9 @@ from refine.results import EvaluatedSet, results_csv, results_json
 from refine.table_files import tables_csv, tables_json, tables_latex, tables_markdown
 from tests.refine.worlds import toy_frame
 
-ROWS = default_methods(("regressor", "gradnet", "wmf", "color", "grad", "ours", "ours_conf_gt"))
+ROWS = default_methods(
+    ("regressor", "gradnet", "wmf", "color", "grad", "ours_quadratic", "ours", "ours_conf_gt")
+)
 
 
 def frames(count: int = 10, per_scene: int = 2) -> list[EvaluationFrame]:
@@ -92,12 +94,13 @@ def test_tables_hold_our_numbers_the_papers_and_both_ratios(evaluated: Evaluated
     assert list(tables) == [1, 2, 3, 4, 5]
     scores = evaluated.evaluation.scores
     second = {row.method: row.cells for row in tables[2].rows}
-    assert list(second) == ["regressor", "wmf", "ours"]
+    assert list(second) == ["regressor", "wmf", "ours_quadratic", "ours"]
     bad_all = second["ours"][2]
     assert bad_all.value == scores["ours"].regions["all"].bad
     assert bad_all.ratio == bad_all.value / scores["regressor"].regions["all"].bad
     assert bad_all.interval.low <= bad_all.value <= bad_all.interval.high
     assert (bad_all.paper, bad_all.paper_ratio) == (0.2117, pytest.approx(21.17 / 23.48))
+    assert second["ours_quadratic"][2].paper == 0.2117  # the paper's is quadratic
     gradnet = tables[1].rows[1].cells[0]
     assert (gradnet.value, gradnet.paper) == (scores["gradnet"].gradient_masked, 0.05)
     fifth = {row.method: row.cells for row in tables[5].rows}

@@ -10,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from refine import MRFParameters, refine_disparity, solve_mrf
-from refine.baselines.ours_robust import OursRobust
-from refine.methods import known_methods
+from refine.baselines.ours import Ours
+from refine.baselines.ours_quadratic import OursQuadratic
+from refine.confidence_shape import ConfidenceShape
 from refine.robust import gradient_factor, solve_robust
-from tests.refine.oracles import robust_minimiser
+from tests.refine.oracles import robust_energy, robust_minimiser
 from tests.refine.worlds import random_problem, toy_frame
 
 MILD = MRFParameters(alpha=5.0, beta=0.1, sigma_r=20.0, confidence_floor=0.05)
@@ -78,17 +79,37 @@ def test_a_step_that_the_image_does_not_show_stays_a_step():
     assert (robust > 1).sum() < 0.7 * (quadratic > 1).sum()
 
 
-def test_the_method_is_the_function():
-    frame = toy_frame(1)
-    method = known_methods()["ours_robust"]()
-    assert isinstance(method, OursRobust)
-    found = method.run(frame).disparity
-    assert found is not None
+def test_ours_is_the_quadratic_mrf_or_this_one_as_its_scale_says():
+    frame, shape = toy_frame(1), ConfidenceShape(power=2.0)
     assert frame.confidence is not None
     assert frame.gradient is not None
-    trust = method.shape.apply(frame.confidence)
-    expected = solve_robust(frame.disparity, trust, frame.gradient, frame.image, method.parameters)
-    np.testing.assert_array_equal(found, expected.disparity.astype(np.float32))
+    inputs = frame.disparity, shape.apply(frame.confidence), frame.gradient, frame.image, MILD
+    quadratic, robust = solve_mrf(*inputs).disparity, solve_robust(*inputs, 0.1).disparity
+    assert np.abs(quadratic - robust).max() > 0.1
+    for method, expected in (
+        (Ours(MILD, shape, gradient_scale=0.1), robust),
+        (Ours(MILD, shape), quadratic),
+        (OursQuadratic(MILD, shape), quadratic),
+    ):
+        np.testing.assert_array_equal(method.run(frame).disparity, expected.astype(np.float32))
+
+
+def test_its_deviation_is_that_of_the_gaussian_at_its_minimum():
+    """Against the inverse of the energy's second derivatives, by differences of its slope."""
+    problem = random_problem(9, 11, seed=2, style="blocks")
+    method = Ours(MILD, gradient_scale=0.5)
+    refined = method.solve(*problem.inputs).disparity.ravel()
+    slope = robust_energy(problem, MILD, 0.5)
+    step = 1e-4
+    curvature = [
+        (slope(refined + step * unit)[1] - slope(refined - step * unit)[1]) / (2 * step)
+        for unit in np.eye(refined.size)
+    ]
+    exact = np.sqrt(np.diag(np.linalg.inv(curvature))).reshape(9, 11)
+    error = method.sample(*problem.inputs, samples=512) / exact - 1
+    assert np.sqrt((error**2).mean()) < 1.5 / 32  # 1 / sqrt(2 * 512)
+    quadratic = Ours(MILD).sample(*problem.inputs, samples=512) / exact - 1
+    assert np.sqrt((quadratic**2).mean()) > 4 / 32
 
 
 @pytest.mark.parametrize(
@@ -104,4 +125,14 @@ def test_the_method_is_the_function():
 def test_what_makes_no_sense_is_refused(changes, complaint):
     problem = random_problem(5, 6, seed=0)
     with pytest.raises(ValueError, match=complaint):
-        solve_robust(*problem.inputs, **changes)
+        solve_robust(*problem.inputs, **{"parameters": MILD, "scale": 0.3, **changes})
+
+
+def test_methods_refuse_a_scale_that_they_cannot_have():
+    for scale in (0.0, -1.0, np.inf):
+        with pytest.raises(ValueError, match="scale must be positive"):
+            Ours(gradient_scale=scale)
+    with pytest.raises(ValueError, match="quadratic gradient term"):
+        Ours(form="paper", gradient_scale=0.3)
+    with pytest.raises(ValueError, match="quadratic gradient term"):
+        OursQuadratic(gradient_scale=0.3)

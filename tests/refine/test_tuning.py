@@ -59,6 +59,38 @@ def test_the_search_walks_to_the_minimum_and_tries_nothing_twice():
     assert list(found.trials) == told
 
 
+@dataclass(frozen=True)
+class Diagonal(Valley):
+    """Its valley runs aslant, so that each round gets a step further; eight of them to the end."""
+
+    search: ClassVar = {"inner.a": tuple(float(i) for i in range(9)), "b": tuple(range(9))}
+    inner: Inner = field(default_factory=lambda: Inner(8.0))
+    b: int = 8
+
+    @property
+    def objective(self) -> float:
+        return self.inner.a + self.b + 2 * abs(self.inner.a - self.b + 0.5)
+
+
+def test_the_search_goes_round_until_it_is_at_the_end():
+    assert tune_method(Diagonal, lambda method: method.objective).method == Diagonal(Inner(0.0), 0)
+
+
+@dataclass(frozen=True)
+class Canyon(Diagonal):
+    """Its slopes are too steep for one parameter alone."""
+
+    tied: ClassVar = (("inner.a", "b"),)
+
+    @property
+    def objective(self) -> float:
+        return self.inner.a + self.b + 9 * abs(self.inner.a - self.b)
+
+
+def test_parameters_that_make_up_for_one_another_are_moved_together():
+    assert tune_method(Canyon, lambda method: method.objective).method == Canyon(Inner(0.0), 0)
+
+
 def test_a_search_goes_on_from_earlier_trials():
     whole = tune_method(Valley, lambda method: method.objective)
     fresh: list[Trial] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
@@ -241,10 +242,26 @@ def test_refine_writes_what_it_promises(demo: tuple[Path, DemoResult], tmp_path:
     refined = read_pfm(tmp_path / "r" / "disparity.pfm")
     assert refined.shape == (192, 384)
     assert np.isfinite(refined).all()
-    assert run("refine", *pair, "--weights", out / "weights", "--out", tmp_path / "robust", "--robust") == 0
-    robust = read_pfm(tmp_path / "robust" / "disparity.pfm")
-    assert np.isfinite(robust).all()
-    assert np.abs(robust - refined).max() > 0.1
+    # The demo tunes nothing: by default it is the paper's MRF, with the paper's parameters.
+    tuned = tmp_path / "parameters.json"
+    methods = {"ours": {"gradient_scale": 0.1}, "ours_quadratic": {"parameters": {"alpha": 7.0}}}
+    tuned.write_text(json.dumps({"format": 1, "about": {}, "methods": methods, "trials": {}}))
+    results = {"untuned": refined}
+    for name, words in (
+        ("untuned exact", ("--form", "exact")),
+        ("robust", ("--parameters", tuned, "--deviation")),
+        ("exact", ("--parameters", tuned, "--form", "exact")),
+        ("paper", ("--parameters", tuned, "--form", "paper", "--deviation")),
+    ):
+        assert run("refine", *pair, "--weights", out / "weights", "--out", tmp_path / name, *words) == 0
+        results[name] = read_pfm(tmp_path / name / "disparity.pfm")
+        assert np.isfinite(results[name]).all()
+    np.testing.assert_array_equal(results.pop("untuned exact"), refined)
+    for one, other in itertools.combinations(results.values(), 2):
+        assert np.abs(one - other).max() > 0.1
+    robust, quadratic = (read_pfm(tmp_path / name / "deviation.pfm") for name in ("robust", "paper"))
+    assert (robust > 0).all()
+    assert np.abs(robust - quadratic).max() > 0.1
 
 
 @pytest.mark.slow
@@ -263,7 +280,6 @@ def test_refine_says_what_is_wrong_with_its_inputs(
     weightless = ("--weights", tmp_path / "nothing", "--out", tmp_path / "r")
     assert "nothing" in refused(1, "refine", left, left, *weightless)
     assert "is a file, not a folder" in refused(2, "refine", left, left, "--out", small)
-    assert "without --robust" in refused(2, "refine", left, left, *common, "--robust", "--form", "paper")
     part = tmp_path / "part"
     part.mkdir()
     for file in (out / "weights").glob("regressor.*"):

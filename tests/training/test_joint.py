@@ -232,7 +232,12 @@ def test_the_command_trains_through_validated_parameters_and_hands_them_on(
 ) -> None:
     init, out = shutil.copytree(start, tmp_path / "init"), tmp_path / "out"
     ours = {"parameters": {"alpha": 12.5}, "shape": {"power": 2.0}}
-    document = {"format": 1, "about": {}, "methods": {"ours": ours}, "trials": {}}
+    document = {
+        "format": 1,
+        "about": {},
+        "methods": {"ours_quadratic": ours, "ours": {**ours, "gradient_scale": 0.1}},
+        "trials": {},
+    }
     (init / "parameters.json").write_text(json.dumps(document))
     words = f"train joint --data {data} --init {init} --out {out} --preset tiny --crop 128x64 --steps 1"
     with pytest.raises(SystemExit) as end:
@@ -246,6 +251,10 @@ def test_the_command_trains_through_validated_parameters_and_hands_them_on(
 
 def test_wrong_requests_are_sentences(data: Path, start: Path, tmp_path: Path) -> None:
     source = [(data, 1.0)]
+    with pytest.raises(TrainingError, match="not with a robust one"):
+        train(
+            "joint", source, tmp_path / "r", quick("joint"), init=start, refinement=Ours(gradient_scale=0.1)
+        )
     with pytest.raises(TrainingError, match="another run folder"):
         train("joint", source, start, quick("joint"), init=start, progress=False)
     with pytest.raises(TrainingError, match="already holds a confnet"):
