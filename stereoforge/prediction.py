@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -22,7 +23,7 @@ from refine.methods import Method
 from refine.settings import Settings, read_settings
 from stereoforge.errors import CommandError
 from training.predict import FreePredictor, Prediction, StereoPredictor
-from training.weights import has_weights
+from training.weights import has_weights, weights_path
 
 PredictorName = Literal["networks", "sgbm"]
 
@@ -132,6 +133,22 @@ def open_predictors(run: Path, device: str = "cpu", predictor: PredictorName = "
         fine_tuned=StereoPredictor(run, device, "regressor_f") if has_weights(run, "regressor_f") else None,
         forest=load_forest(forest_file(run)) if forest_file(run).exists() else None,
     )
+
+
+PREDICTING: Mapping[PredictorName, tuple[str, ...]] = {
+    "networks": ("regressor", "confnet", "gradnet", "regressor_f"),
+    "sgbm": ("confnet_free", "gradnet_free"),
+}
+"""The networks that fill the fields of `EvaluationFrame` that methods look at."""
+
+
+def network_digests(run: Path, predictor: PredictorName = "networks") -> dict[str, str]:
+    """SHA-256 of the weights of each network that predicts, of those a run folder has."""
+    return {
+        task: hashlib.sha256(weights_path(run, task).read_bytes()).hexdigest()
+        for task in PREDICTING[predictor]
+        if has_weights(run, task)
+    }
 
 
 def forest_file(run: Path) -> Path:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -120,11 +121,20 @@ def validation_frames(
         return [predictors.frame(samples[i]) for i in progress.track(chosen, description="predicting")]
 
 
-def describe(frames: Sequence[EvaluationFrame], data: Sequence[str], objective: Objective) -> dict[str, Any]:
-    """What is written of a search's circumstances; the fingerprint tells whether two searches are the same."""
-    digest = hashlib.sha256(objective.encode())
+def describe(
+    frames: Sequence[EvaluationFrame],
+    data: Sequence[str],
+    objective: Objective,
+    networks: Mapping[str, str],
+) -> dict[str, Any]:
+    """What is written of a search's circumstances; the fingerprint tells whether two searches are the same.
+
+    It is of the pictures, the truth and the networks (`prediction.network_digests`), not of what the networks predict,
+    which another number of threads rounds differently.
+    """
+    digest = hashlib.sha256(json.dumps([objective, dict(networks)], sort_keys=True).encode())
     for frame in frames:
-        for values in (frame.truth, frame.disparity, frame.confidence, frame.gradient, frame.fine_tuned):
+        for values in (frame.image, frame.right, frame.truth):
             digest.update(b"-" if values is None else np.ascontiguousarray(values).tobytes())
     return {
         "data": list(data),

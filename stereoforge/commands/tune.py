@@ -51,7 +51,13 @@ class Tune:
 
         from datagen.source import open_source
         from refine.methods import default_methods
-        from stereoforge.prediction import open_predictors, parameters_file, untrained, untrained_notes
+        from stereoforge.prediction import (
+            network_digests,
+            open_predictors,
+            parameters_file,
+            untrained,
+            untrained_notes,
+        )
         from stereoforge.tuning import Tuning, describe, shown_values, validation_frames
 
         sources = [open_source(text) for text in self.data]
@@ -63,7 +69,8 @@ class Tune:
             raise CommandError("; ".join(notes) or f"{', '.join(methods)}: there is nothing to tune")
         frames = validation_frames(sources, predictors, self.frames)
         out = parameters_file(self.weights, self.predictor) if self.out is None else self.out
-        tuned = Tuning(frames, out, describe(frames, self.data, self.objective), self.objective).run(methods)
+        about = describe(frames, self.data, self.objective, network_digests(self.weights, self.predictor))
+        tuned = Tuning(frames, out, about, self.objective).run(methods)
         table = Table(
             "method", "default", "tuned", "parameters", title=f"{self.objective}, relative to the input"
         )

@@ -23,7 +23,13 @@ from scenes.serialization import to_plain
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.evaluation import TestData, evaluate_set, evaluation_options, family_of
 from stereoforge.forest import PLANS, train_forest
-from stereoforge.prediction import forest_file, open_predictors, open_settings, parameters_file
+from stereoforge.prediction import (
+    forest_file,
+    network_digests,
+    open_predictors,
+    open_settings,
+    parameters_file,
+)
 from stereoforge.rendering import render_all
 from stereoforge.study.jobs import Job, make_job, run_jobs
 from stereoforge.study.plan import NETWORKS, TEST_SPLITS, TRAINING_SPLITS, StudyPlan
@@ -279,7 +285,7 @@ class _Study:
             collected = _collect(jobs, folder / "networks")
             predictors = open_predictors(collected, self.device)
             frames = validation_frames([open_source(data.source)], predictors, count)
-            about = describe_tuning(frames, [data.source], "balanced")
+            about = describe_tuning(frames, [data.source], "balanced", network_digests(collected))
             Tuning(frames, parameters_file(folder), about).run(self._tuned_methods(name))
 
         settings = {

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import stereoforge.tuning as tuning
@@ -13,6 +14,7 @@ from datagen import DatasetError
 from datagen.source import DataSource, SourceFormat
 from refine.settings import read_settings
 from stereoforge.errors import CommandError
+from stereoforge.prediction import network_digests
 from stereoforge.tuning import Tuning, describe, validation_frames
 from tests.refine.worlds import toy_frame
 
@@ -22,9 +24,9 @@ def frames_with_networks():
     return [replace(frame, confidence=frame.confidence.clip(0, 1)) for frame in frames]
 
 
-def search(out: Path, frames=None) -> Tuning:
+def search(out: Path, frames=None, networks: str = "trained") -> Tuning:
     frames = frames or frames_with_networks()
-    return Tuning(frames, out, describe(frames, ["data"], "balanced"))
+    return Tuning(frames, out, describe(frames, ["data"], "balanced", {"regressor": networks}))
 
 
 def test_an_interrupted_search_ends_as_an_uninterrupted_one(tmp_path, monkeypatch):
@@ -61,6 +63,28 @@ def test_another_set_of_frames_starts_anew_and_another_method_joins(tmp_path):
     assert set(read_settings(out).methods) == {"wmf", "grad"}
     search(out, frames_with_networks()[:1]).run(("grad",))
     assert set(read_settings(out).methods) == {"grad"}
+
+
+def test_a_search_is_known_by_its_networks_not_by_how_their_predictions_are_rounded(tmp_path):
+    """Another number of threads rounds otherwise, and must not throw away what was found."""
+    out = tmp_path / "parameters.json"
+    search(out).run(("wmf",))
+    frames = [replace(f, disparity=np.nextafter(f.disparity, np.float32(99))) for f in frames_with_networks()]
+    search(out, frames).run(("grad",))
+    assert set(read_settings(out).methods) == {"wmf", "grad"}
+    search(out, networks="trained further").run(("grad",))
+    assert set(read_settings(out).methods) == {"grad"}
+
+
+def test_networks_are_told_apart_by_their_weights(tmp_path):
+    for task in ("regressor", "gradnet_free"):
+        (tmp_path / f"{task}.safetensors").write_bytes(task.encode())
+        (tmp_path / f"{task}.json").write_text("{}")
+    before = network_digests(tmp_path)
+    assert before.keys() == {"regressor"}
+    assert network_digests(tmp_path, "sgbm").keys() == {"gradnet_free"}
+    (tmp_path / "regressor.safetensors").write_bytes(b"others")
+    assert network_digests(tmp_path) != before
 
 
 def test_methods_without_inputs_or_parameters_are_left_out(tmp_path):
