@@ -223,6 +223,16 @@ def test_the_overview_has_intervals_under_its_ratios(tmp_path, evaluation):
     assert low <= float(ratio[1]) <= high
 
 
+def test_the_papers_ratios_stand_beside_ours_with_and_without_intervals(tmp_path, evaluation):
+    """Each number's small lines: as many beside it as under it. One scene has no intervals."""
+    small = r"<small>(.*?)</small>"
+    for name, frames, lines in (("six", evaluation, 2), ("one", evaluate([toy_frame(0)], MAIN_ROWS), 1)):
+        text = write_report([EvaluatedSet(name, frames, "flying_things")], tmp_path / name).html.read_text()
+        row = re.search(r'id="[^"]*-table-2".*?>Ours</th>(.*?)</tr>', text, re.DOTALL)
+        cells = [[line for line in re.findall(small, cell) if line] for cell in row[1].split("<td")[1:]]
+        assert [len(cell) for cell in cells] == [lines] * 8, cells
+
+
 def brute_force_window(score: np.ndarray, size: tuple[int, int]) -> tuple[slice, slice]:
     """The window of the largest sum, by trying all of them."""
     windows = [
