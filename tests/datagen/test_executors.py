@@ -19,9 +19,6 @@ from datagen.executors.devices import assign_devices, find_gpus
 from scenes.shapes import SHAPES
 from workers import Limits
 
-WHOLE_AT = {"be killed often": 12, "be killed thrice": 4}
-"""The attempt at which nobody kills them any more."""
-
 
 def misbehave(job: tuple[str, Path]) -> str:
     kind, folder = job
@@ -35,10 +32,10 @@ def misbehave(job: tuple[str, Path]) -> str:
     if kind == "crash once" and not (folder / "crashed").exists():
         (folder / "crashed").touch()
         ctypes.string_at(0)
-    if kind in WHOLE_AT:
+    if kind == "be killed often":
         with (folder / "kills").open("a") as kills:
             kills.write("x")
-        if len((folder / "kills").read_text()) < WHOLE_AT[kind]:
+        if len((folder / "kills").read_text()) < 12:
             os.kill(os.getpid(), signal.SIGKILL)
     if kind == "hang":
         time.sleep(600)
