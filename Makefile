@@ -30,7 +30,7 @@ demo: .venv/.installed
 study: .venv/.installed
 	$(BIN)/stereoforge study --plan recipes/study.yaml --out $(STUDY)
 	rm -rf results && cp -R $(STUDY)/results results
-	@echo "the networks: $(STUDY)/runs; those in weights/ are of the flying_things there"
+	@echo "the networks: $(STUDY)/runs; those in stereoforge/weights/ are of the flying_things there"
 
 test: .venv/.installed-dev
 	OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest $(PYTEST_FLAGS)
@@ -42,7 +42,7 @@ check: .venv/.installed-dev
 	$(BIN)/lint-imports
 
 test-blender-5.2: $(BLENDER_5_2)/.installed
-	OMP_NUM_THREADS=1 $(BLENDER_5_2)/bin/python -m pytest $(PYTEST_FLAGS) tests/scenes tests/datagen tests/storage tests/viewing
+	OMP_NUM_THREADS=1 $(BLENDER_5_2)/bin/python -m pytest $(PYTEST_FLAGS) tests/scenes tests/datagen tests/stereoforge_kit/files tests/stereoforge_kit/viewing
 
 $(BLENDER_5_2)/.installed: pyproject.toml constraints-blender-5.2.txt
 	@$(PYTHON313) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 13))' 2>/dev/null || \

@@ -25,9 +25,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from datagen.source import open_source
-from refine.tuning import measure
-from stereoforge.prediction import open_predictors, open_settings
+from datagen.sources.registry import open_source
+from refine.evaluation.tuning import measure
+from stereoforge.pipelines.prediction import open_predictors, open_settings
 from training.metrics import sparsification_auc
 from training.presets import (
     SMALL_CONFNET,
@@ -40,8 +40,8 @@ from training.presets import (
     Preset,
     RegressorPreset,
 )
-from training.train import train
-from training.weights import copy_weights, has_weights
+from training.runs.train import train
+from training.runs.weights import copy_weights, has_weights
 
 FINEST_ONLY = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 EVEN = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)

@@ -36,14 +36,14 @@ from numpy.typing import NDArray
 from benchmarks.render import WorkerMemory
 from datagen import Recipe
 from datagen.blender.build import build_world, place
+from datagen.blender.camera import render_view
 from datagen.blender.session import CyclesSettings, quiet, start_empty_file
-from datagen.blender.view import render_view
-from datagen.curation import Curation
-from datagen.exposure import automatic_exposure, develop
-from datagen.layout import Layout
-from datagen.manifest import read_manifest
-from datagen.recipe import write_recipe
-from datagen.scene_geometry import SceneGeometry
+from datagen.dataset.layout import Layout
+from datagen.dataset.manifest import read_manifest
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.recipe.curation import Curation
+from datagen.recipe.recipe import write_recipe
+from datagen.rendering.exposure import automatic_exposure, develop
 from scenes import FAMILIES, Scene
 
 SETTINGS = ("chosen", "api", "shipped")

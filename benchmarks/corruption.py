@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 import trimesh
 
-from datagen.assets import prepare_environment, prepare_mesh, prepare_texture
-from datagen.dataset import read_scene
+from datagen.dataset.manifest import FileEntry, SceneManifest, read_manifest, write_manifest
+from datagen.dataset.samples import read_scene
+from datagen.dataset.shards import shard_index
 from datagen.formats import (
     read_camera_data,
     read_gradient,
@@ -25,12 +26,11 @@ from datagen.formats import (
     write_pfm,
     write_png,
 )
-from datagen.manifest import FileEntry, SceneManifest, read_manifest, write_manifest
-from datagen.recipe import Recipe, read_recipe, write_recipe
-from datagen.shards import shard_index
+from datagen.recipe.assets import prepare_environment, prepare_mesh, prepare_texture
+from datagen.recipe.recipe import Recipe, read_recipe, write_recipe
 from scenes import FAMILIES, sample_scene, scene_to_json
 from training.networks import DispNetConfig, DispNetCorr1D
-from training.weights import TrainingSummary, load_regressor, save_weights
+from training.runs.weights import TrainingSummary, load_regressor, save_weights
 
 FLYING_THINGS = FAMILIES["flying_things"]
 
@@ -48,7 +48,7 @@ def read_shard(path: Path) -> None:
 
 
 def read_asset(prepare: Callable[[Path], object], path: Path) -> None:
-    """A user's own file, read as `datagen.assets` does: whatever its parser raises refuses it."""
+    """A user's own file, read as `datagen.recipe.assets` does: whatever its parser raises refuses it."""
     try:
         prepare(path)
     except Exception as error:

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.blender.build import build_world
+from datagen.blender.camera import render_view
 from datagen.blender.session import CyclesSettings, quiet, start_empty_file
-from datagen.blender.view import render_view
-from datagen.exposure import automatic_exposure, develop
-from datagen.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.rendering.exposure import automatic_exposure, develop
 from scenes import FAMILIES, Scene, sample_scene
 
 

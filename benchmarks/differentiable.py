@@ -18,11 +18,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from datagen.source import open_source
-from refine.differentiable import ImageWeights, image_weights, refine_batch
-from refine.parameters import MRFParameters
-from stereoforge.prediction import open_predictors, open_settings
-from stereoforge.shipped import SHIPPED_WEIGHTS
+from datagen.sources.registry import open_source
+from refine.energy.parameters import MRFParameters
+from refine.mrf.torch.differentiable import ImageWeights, image_weights, refine_batch
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS
+from stereoforge.pipelines.prediction import open_predictors, open_settings
 from training.presets import find_preset
 
 WAYS = {"kernels": True, "torch": False}
@@ -54,7 +54,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", required=True)
-    parser.add_argument("--weights", type=Path, default=SHIPPED_WEIGHTS)
+    parser.add_argument("--weights", type=Path, default=BUNDLED_WEIGHTS)
     parser.add_argument("--crops", type=int, default=4)
     parser.add_argument("--repeat", type=int, default=5)
     options = parser.parse_args()
@@ -65,7 +65,7 @@ def main() -> None:
     for _ in range(1 + options.repeat):  # the first compiles
         for way, kernels in WAYS.items():
             trust = confidence.clone().requires_grad_()
-            with patch("refine.differentiable._has_kernels", lambda *_, kernels=kernels: kernels):
+            with patch("refine.mrf.torch.differentiable._has_kernels", lambda *_, kernels=kernels: kernels):
                 began = time.perf_counter()
                 refined = refine_batch(disparity, trust, gradient, weights, parameters, tolerance=tolerance)
                 refined.sum().backward()  # type: ignore[no-untyped-call]

@@ -40,22 +40,22 @@ import numpy as np
 
 from benchmarks.corruption import READERS, damage, make_examples
 from datagen import Recipe, StereoDataset, render_dataset
-from datagen.dataset import StereoSample
+from datagen.dataset.layout import EYES
+from datagen.dataset.samples import StereoSample
+from datagen.dataset.shards import shard_index
 from datagen.errors import DatasetError, DiskFullError
 from datagen.executors import LocalExecutor, RayExecutor, WorkerPolicy
 from datagen.export import EXPORTERS, ExportOptions
-from datagen.frame import StereoFrame
-from datagen.layout import EYES
-from datagen.recipe import write_recipe
-from datagen.shards import shard_index
-from datagen.source import open_source
+from datagen.recipe.recipe import write_recipe
 from datagen.sources import webdataset
-from datagen.verify import verify_dataset
+from datagen.sources.registry import open_source
+from datagen.sources.stereo_frame import StereoFrame
+from datagen.verify.run import verify_dataset
 from scenes import FAMILIES, scene_to_json
-from storage import open_tree
+from stereoforge_kit.files import open_tree
+from stereoforge_kit.processes import Limits, WorkerError, WorkerProcess
 from tests.datagen.sabotage import Sabotage, hashes, without
 from training.errors import TrainingError
-from workers import Limits, WorkerError, WorkerProcess
 
 WORLD = FAMILIES["flying_things"].config(
     width=64,

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
-from refine.baselines.ours_quadratic import OursQuadratic
-from refine.baselines.regressor import Regressor
-from refine.evaluation import evaluate
-from refine.methods import Method
-from stereoforge.evaluation import evaluation_options, open_test_data
-from stereoforge.prediction import open_predictors, open_settings, parameters_file
-from training.predict import StereoPredictor
+from refine.evaluation.evaluate import evaluate
+from refine.methods.base import Method
+from refine.methods.ours_quadratic import OursQuadratic
+from refine.methods.regressor import Regressor
+from stereoforge.pipelines.prediction import open_predictors, open_settings, parameters_file
+from stereoforge.pipelines.set_evaluation import evaluation_options, open_test_data
+from training.prediction.predictor import StereoPredictor
 
 
 @dataclass(frozen=True)

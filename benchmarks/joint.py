@@ -11,13 +11,13 @@ import argparse
 import shutil
 from pathlib import Path
 
-from refine.pooling import MethodScore
-from refine.results import mean_aucs
-from stereoforge.evaluation import evaluate_set, open_test_data
-from stereoforge.prediction import open_predictors, open_settings, parameters_file
+from refine.evaluation.pooling import MethodScore
+from refine.evaluation.results import mean_aucs
+from stereoforge.pipelines.prediction import open_predictors, open_settings, parameters_file
+from stereoforge.pipelines.set_evaluation import evaluate_set, open_test_data
 from training.presets import find_preset
-from training.train import train
-from training.weights import has_weights
+from training.runs.train import train
+from training.runs.weights import has_weights
 
 METHODS = ("gradnet", "ours_quadratic")
 

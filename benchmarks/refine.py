@@ -27,9 +27,9 @@ from statistics import median
 import numba
 import numpy as np
 
-from refine.parameters import MRFParameters
-from refine.system import Form, build_system
-from refine.weights import Floats
+from refine.energy.affinity import Floats
+from refine.energy.parameters import MRFParameters
+from refine.energy.system import Form, build_system
 
 Inputs = tuple[Floats, Floats, Floats, np.ndarray]
 
@@ -37,8 +37,8 @@ Inputs = tuple[Floats, Floats, Floats, np.ndarray]
 def frame_inputs(root: Path, split: str) -> Inputs:
     """Disparity, confidence, gradient and image of the data set's first frame."""
     from datagen import StereoDataset
-    from matching import fill_background, match_sgbm
     from refine.metrics import forward_gradient
+    from stereoforge_kit.matching import fill_background, match_sgbm
 
     sample = StereoDataset(root, split)[0]
     left, right = sample.left, sample.right
@@ -58,7 +58,7 @@ def frame_inputs(root: Path, split: str) -> Inputs:
 def predicted_inputs(root: Path, split: str, weights: Path) -> Inputs:
     """The same frame with what trained networks make of it."""
     from datagen import StereoDataset
-    from training.predict import StereoPredictor
+    from training.prediction.predictor import StereoPredictor
 
     sample = StereoDataset(root, split)[0]
     found = StereoPredictor(weights).predict(sample.left, sample.right)

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from datagen import Recipe, render_dataset
-from datagen.layout import Layout
-from datagen.manifest import SceneManifest, read_manifest
+from datagen.dataset.layout import Layout
+from datagen.dataset.manifest import SceneManifest, read_manifest
 from scenes import FAMILIES
 
 SAMPLING = "render"

@@ -25,8 +25,7 @@ from torch import Tensor, nn
 from torch.profiler import ProfilerActivity, profile
 
 from benchmarks.plain_dispnet import PlainDispNet
-from training.data import Batch, StereoDataModule, open_sources
-from training.hardware import faster_layout
+from training.data.pipeline import Batch, StereoDataModule, open_sources
 from training.losses import multiscale_l1
 from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.presets import (
@@ -40,6 +39,7 @@ from training.presets import (
     RegressorPreset,
     find_preset,
 )
+from training.runs.hardware import faster_layout
 from training.tasks import (
     ConfNetTask,
     FineTuningTask,
@@ -86,7 +86,7 @@ def build_task(preset: Preset, regressor_preset: RegressorPreset) -> StereoTask:
 
 
 def our_step(task: StereoTask, batch: Batch, bf16: bool = False) -> Step:
-    """One iteration as `training.train` runs it on a CPU."""
+    """One iteration as `training.runs.train` runs it on a CPU."""
     faster_layout(task)
     task.train()
     task.mixed_precision = bf16

@@ -1,9 +1,9 @@
 """How a world becomes a sample: scenes rendered in Blender, exact ground truth, data sets on disk."""
 
-from datagen.dataset import StereoDataset, StereoSample
+from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.errors import DatasetError, FormatError
-from datagen.recipe import Recipe, read_recipe
-from datagen.render import RenderSummary, render_dataset
+from datagen.recipe.recipe import Recipe, read_recipe
+from datagen.rendering.run import RenderSummary, render_dataset
 
 __all__ = [
     "DatasetError",

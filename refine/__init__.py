@@ -4,8 +4,8 @@ evaluation, report.
 The MRF and the metrics take numpy arrays and know nothing of data sets or networks.
 """
 
-from refine.mrf import ConvergenceWarning, MRFSolution, SolveInfo, refine_disparity, solve_mrf
-from refine.parameters import MRFParameters
+from refine.energy.parameters import MRFParameters
+from refine.mrf.solve import ConvergenceWarning, MRFSolution, SolveInfo, refine_disparity, solve_mrf
 from refine.solvers import SolverError
 
 __all__ = [

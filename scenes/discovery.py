@@ -12,9 +12,18 @@ T = TypeVar("T")
 
 
 def modules_in(package: ModuleType) -> list[ModuleType]:
-    """The package's modules, in alphabetical order (sampling order must not depend on the file system)."""
-    names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
-    return [importlib.import_module(f"{package.__name__}.{name}") for name in names]
+    """The modules of a package and of its sub-packages, in alphabetical order of their own names.
+
+    Sampling draws by position, so the order must not depend on the file system; and since a module's folder does not
+    count, moving it to another sub-package leaves every scene as it was.
+    """
+    found = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+    names = [module.name for module in found if not module.ispkg]
+    return [importlib.import_module(name) for name in sorted(names, key=lambda name: (_own_name(name), name))]
+
+
+def _own_name(module: str) -> str:
+    return module.rpartition(".")[2]
 
 
 def concrete_subclasses(package: ModuleType, base: type[T]) -> dict[str, type[T]]:

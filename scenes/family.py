@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Self, get_type_hints
 
 import numpy as np
 
-from scenes.assets import AssetPool
-from scenes.drawing import Count, Range
-from scenes.own_content import Replaceable
+from scenes.random_draws import Count, Range
 from scenes.spec import Scene
+from scenes.user_assets.pool import AssetPool
+from scenes.user_assets.replacement import Replaceable
 
 EMPTIEST = 0.1
 """What is left of a family's crowd at complexity 0."""

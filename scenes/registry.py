@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import scenes.families
-from scenes.assets import AssetPool
 from scenes.discovery import modules_in
 from scenes.family import Family, FamilyConfig
-from scenes.own_content import with_own_content
 from scenes.spec import Scene
+from scenes.user_assets.pool import AssetPool
+from scenes.user_assets.replacement import with_own_content
 
 FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in modules_in(scenes.families)}
 

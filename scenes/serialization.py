@@ -17,13 +17,13 @@ from cattrs.gen import make_dict_structure_fn, make_dict_unstructure_fn, overrid
 from cattrs.strategies import configure_tagged_union
 from cattrs.v import format_exception
 
-import scenes.deformations
+import scenes.motion.deformations
 import scenes.shapes
 import scenes.textures
-from scenes.assets import USER_SHAPES, USER_TEXTURES
 from scenes.family import FamilyConfig
 from scenes.registry import FAMILIES
 from scenes.spec import Deformation, Light, Scene, Shape, Texture
+from scenes.user_assets.pool import USER_SHAPES, USER_TEXTURES
 
 T = TypeVar("T")
 
@@ -70,7 +70,7 @@ def _make_converter() -> Converter:
     )
     _tagged(converter, Shape, scenes.shapes.SHAPES | USER_SHAPES)
     _tagged(converter, Texture, scenes.textures.TEXTURES | USER_TEXTURES)
-    _tagged(converter, Deformation, scenes.deformations.DEFORMATIONS)
+    _tagged(converter, Deformation, scenes.motion.deformations.DEFORMATIONS)
     _tagged(converter, FamilyConfig, {name: kind.config for name, kind in FAMILIES.items()}, tag="family")
     configure_tagged_union(Light, converter, tag_name="kind")
     return converter

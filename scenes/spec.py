@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from scenes.mesh import Mesh
+from scenes.geometry.mesh import Mesh
 
 Vector = tuple[float, float, float]
 Color = tuple[float, float, float]
@@ -70,7 +70,7 @@ class Texture(ABC):
 
 @dataclass(frozen=True)
 class Deformation(ABC):
-    """A non-rigid motion of one mesh; subclasses in `scenes.deformations` each know one way to bend it."""
+    """A non-rigid motion of one mesh; subclasses in `scenes.motion.deformations` each know one way to bend it."""
 
     @abstractmethod
     def deformed(self, vertices: NDArray[np.float64], time_frames: float) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.console import Console
 
-from viewing import JobProgress
+from stereoforge_kit.viewing import JobProgress
 
 console = Console(highlight=False)
 

@@ -10,27 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from datagen.dataset import read_scene
+from datagen.dataset.manifest import FileEntry
+from datagen.dataset.samples import read_scene
 from datagen.errors import DatasetError
-from datagen.manifest import FileEntry
-from datagen.recipe import read_recipe
+from datagen.recipe.recipe import read_recipe
+from stereoforge_kit.processes import call_limited
 from training.errors import TrainingError
-from training.weights import load_regressor
-from workers import call_limited
+from training.runs.weights import load_regressor
 
-PACKAGES = (
-    "scenes",
-    "datagen",
-    "training",
-    "refine",
-    "matching",
-    "viewing",
-    "storage",
-    "workers",
-    "stereoforge",
-)
+PACKAGES = ("scenes", "datagen", "training", "refine", "stereoforge_kit", "stereoforge")
 FORBIDDEN_MODULES = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
-PIPE_TO_OWN_CHILD = "workers/process.py"
+PIPE_TO_OWN_CHILD = "stereoforge_kit/processes/process.py"
 """Tries whether an exception survives the pipe between a process and its own worker; reads no file."""
 FORBIDDEN_CALLS = {"eval", "exec", "yaml.load", "yaml.unsafe_load", "yaml.full_load", "torch.load"}
 ROOT = Path(__file__).parents[1]

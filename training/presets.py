@@ -6,7 +6,7 @@ changed, all of it here: BatchNorm (its statistics fixed towards the end of a re
 correlation, predictions in units of 16 px, a larger learning rate with warm-up and a cosine end, gradient clipping, a
 compressed loss schedule, milder colour changes, flips, heads that work at the features' half resolution and also see
 matching costs around the disparity, how the disparity lies in its surroundings and, for GradNet, their slopes
-(`training.networks.evidence`), since the features of a small regressor hold too little of these; and, in `small`,
+(`training.networks.cost_features`), since the features of a small regressor hold too little of these; and, in `small`,
 some of the heads' crops are sheared into slants, and GradNet looks further around (dilations; docs/ablations.md).
 """
 
@@ -16,13 +16,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal, get_args
 
-from matching import SGBMParameters
-from training.augmentation import AugmentationConfig
+from stereoforge_kit.matching import SGBMParameters
+from training.data.augmentation import AugmentationConfig
 from training.errors import TrainingError
-from training.free import FREE_FEATURES
 from training.losses import STAGE_WEIGHTS, STATIC_WEIGHTS, ScaleWeights
 from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
-from training.networks.dispnet import STRIDE
+from training.networks.regressors.dispnet import STRIDE
+from training.prediction.regressor_free import FREE_FEATURES
 
 Task = Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free", "joint"]
 TASKS: tuple[Task, ...] = get_args(Task)

@@ -11,10 +11,10 @@ from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
 from datagen.blender.materials import build_material, image_from_array, image_from_radiance
-from datagen.scene_geometry import SceneGeometry
-from scenes.assets import UserEnvironment
-from scenes.mesh import Mesh
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from scenes.geometry.mesh import Mesh
 from scenes.spec import AreaLight, Light, Scene, StereoCamera, SunLight, World
+from scenes.user_assets.pool import UserEnvironment
 
 
 @dataclass(frozen=True)

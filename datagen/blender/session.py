@@ -122,7 +122,9 @@ def _configure_output(scene: bpy.types.Scene) -> None:
     image.file_format = "OPEN_EXR_MULTILAYER"
     image.color_depth = "32"
     image.exr_codec = "NONE"
-    scene.view_layers[0].use_pass_z = False  # Ground truth comes from the geometry (`datagen.raycast`).
+    scene.view_layers[
+        0
+    ].use_pass_z = False  # Ground truth comes from the geometry (`datagen.ground_truth.raycast`).
     scene.render.use_compositing = False
     scene.render.use_sequencer = False
     scene.render.film_transparent = False

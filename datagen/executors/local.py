@@ -9,7 +9,7 @@ from multiprocessing.connection import wait
 
 from datagen.executors.base import Job, Outcomes, Result
 from datagen.executors.supervisor import Supervisor, WorkerPolicy
-from workers.process import POLL_S
+from stereoforge_kit.processes.process import POLL_S
 
 
 @dataclass(frozen=True)

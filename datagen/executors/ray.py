@@ -18,8 +18,8 @@ from typing import Any
 
 from datagen.executors.base import Failure, Job, Outcome, Outcomes, Result
 from datagen.executors.supervisor import Supervisor, WorkerPolicy
-from storage import temporary_folder
-from workers.process import POLL_S
+from stereoforge_kit.files import temporary_folder
+from stereoforge_kit.processes.process import POLL_S
 
 LOST_MACHINE_RETRIES = 10
 """How often Ray may run a job again whose machine or Ray worker is gone."""

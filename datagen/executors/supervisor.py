@@ -9,7 +9,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from datagen.executors.base import Failure, Outcome
-from workers import Limits, WorkerError, WorkerProcess
+from stereoforge_kit.processes import Limits, WorkerError, WorkerProcess
 
 MAX_KILLS = 30
 """How often a job may be killed from outside. It is not the job's fault, but a machine without memory does that too."""

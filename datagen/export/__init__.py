@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from datagen.dataset import StereoDataset
+from datagen.dataset.samples import StereoDataset
 from datagen.export.kitti import export_kitti
 from datagen.export.sceneflow import export_sceneflow
 from datagen.export.shards import export_webdataset
-from storage import Tree
+from stereoforge_kit.files import Tree
 
 
 @dataclass(frozen=True)

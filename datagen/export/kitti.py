@@ -15,13 +15,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.dataset import StereoDataset, StereoSample
+from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.export.lidar import lidar_mask
 from datagen.formats import write_png
-from scenes.shapes.vehicles import VEHICLE_PARTS
+from scenes.shapes.street.vehicles import VEHICLE_PARTS
 from scenes.spec import Scene
 from scenes.streets.traffic import vehicle_of
-from storage import Tree
+from stereoforge_kit.files import Tree
 
 FOLDERS = {"train": "training", "val": "validation", "test": "testing"}
 """KITTI has no validation set and keeps the ground truth of its testing set to itself; here all have it."""

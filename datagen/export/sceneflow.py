@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from itertools import groupby
 from pathlib import Path
 
-from datagen.dataset import StereoDataset
-from datagen.layout import RENDER_PASSES
-from datagen.manifest import read_manifest
-from storage import Tree
+from datagen.dataset.layout import RENDER_PASSES
+from datagen.dataset.manifest import read_manifest
+from datagen.dataset.samples import StereoDataset
+from stereoforge_kit.files import Tree
 
 KINDS = (*RENDER_PASSES.values(), "disparity", "camera_data")
 

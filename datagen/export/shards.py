@@ -12,13 +12,13 @@ import tarfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 
-from datagen.dataset import StereoDataset, StereoSample
+from datagen.dataset.layout import EYES, KINDS, RENDER_PASSES, TARGETS
+from datagen.dataset.manifest import FileEntry, file_entry, read_manifest, seal
+from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.errors import DatasetError
-from datagen.layout import EYES, KINDS, RENDER_PASSES, TARGETS
-from datagen.manifest import FileEntry, file_entry, read_manifest, seal
-from datagen.recipe import read_recipe, recipe_to_text
+from datagen.recipe.recipe import read_recipe, recipe_to_text
 from datagen.sources.webdataset import INDEX_NAME, META
-from storage import Tree
+from stereoforge_kit.files import Tree
 
 
 def export_webdataset(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats.limits import read_bounded
-from storage import write_bytes
+from stereoforge_kit.files import write_bytes
 
 Matrix = NDArray[np.float64]
 

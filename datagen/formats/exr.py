@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats.limits import check_image_size, read_bounded
-from storage import replacing
+from stereoforge_kit.files import replacing
 
 _MAGIC_AND_VERSION = struct.pack("<II", 20000630, 2)
 """Version 2 with no flag set: one part, scan lines, short names, no deep data."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats.limits import check_image_size, read_bounded
-from storage import write_bytes
+from stereoforge_kit.files import write_bytes
 
 _HEADER = re.compile(rb"(P[fF])\s{1,8}(\d{1,9})\s{1,8}(\d{1,9})\s{1,8}(\S{1,32})\s")
 

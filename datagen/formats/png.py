@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats.limits import check_image_size, read_bounded, require_regular
-from storage import write_bytes
+from stereoforge_kit.files import write_bytes
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COMPRESSION_LEVEL = 1

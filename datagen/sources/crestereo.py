@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from datagen.errors import FormatError
 from datagen.formats import read_png
 from datagen.formats.picture import read_picture
-from datagen.frame import FileFrame, FileFrames, StereoFrame
-from datagen.source import SourceFormat
+from datagen.sources.registry import SourceFormat
+from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 UNITS_PER_PX = 32
 _LEFT = "_left.disp.png"

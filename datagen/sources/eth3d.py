@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from datagen.frame import FileFrame, FileFrames, StereoFrame
-from datagen.source import SourceFormat
 from datagen.sources.middlebury import ETH3D_IMAGES, scene_frame
+from datagen.sources.registry import SourceFormat
+from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 
 def _recognises(root: Path) -> bool:

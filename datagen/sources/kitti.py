@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.derived import occlusion_from_mask
 from datagen.errors import FormatError
 from datagen.formats import read_png
 from datagen.formats.picture import read_picture
-from datagen.frame import FileFrame, FileFrames, StereoFrame
-from datagen.source import SourceFormat
+from datagen.ground_truth.from_disparity import occlusion_from_mask
+from datagen.sources.registry import SourceFormat
+from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 UNITS_PER_PX = 256
 

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.derived import occlusion_from_mask
 from datagen.formats import read_pfm, read_png
 from datagen.formats.picture import read_picture
-from datagen.frame import FileFrame, FileFrames, StereoFrame
-from datagen.source import SourceFormat
+from datagen.ground_truth.from_disparity import occlusion_from_mask
+from datagen.sources.registry import SourceFormat
+from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 ETH3D_IMAGES = "two_view_training"
 """ETH3D's folder of images: its scenes are encoded as these are (`datagen.sources.eth3d`)."""

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats.picture import read_picture, read_raster
-from datagen.frame import FileFrame, FileFrames, StereoFrame
-from datagen.source import SourceFormat
+from datagen.sources.registry import SourceFormat
+from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 _SCALES = ((450, 4), (900, 2), (1800, 1))
 """Grey values a pixel of disparity, up to each image width."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from datagen.dataset import StereoDataset, StereoSample, open_layout
-from datagen.frame import StereoFrame
-from datagen.layout import SPLITS
-from datagen.source import SourceFormat
+from datagen.dataset.layout import SPLITS
+from datagen.dataset.samples import StereoDataset, StereoSample, open_layout
+from datagen.sources.registry import SourceFormat
+from datagen.sources.stereo_frame import StereoFrame
 from datagen.sources.webdataset import INDEX_NAME
 
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from datagen.formats import read_pfm
 from datagen.formats.picture import read_picture
-from datagen.frame import FileFrame, FileFrames, StereoFrame
-from datagen.source import SourceFormat
+from datagen.sources.registry import SourceFormat
+from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
 PARTS = {"train": "TRAIN", "test": "TEST"}

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from datagen.errors import FormatError
 from datagen.formats import read_png
 from datagen.formats.picture import read_picture
-from datagen.frame import FileFrame, FileFrames, StereoFrame
-from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, VISIBLE
-from datagen.source import SourceFormat
+from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.sources.registry import SourceFormat
+from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 _UNITS = np.array([4, 1 / 64, 1 / 16384], np.float32)
 

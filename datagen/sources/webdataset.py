@@ -21,15 +21,15 @@ import fsspec
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.dataset.layout import SPLITS
+from datagen.dataset.manifest import OWN_DIGEST, FileEntry, check_seal, file_entries
+from datagen.dataset.shards import list_shards, local_copy, read_sample_member, shard_index
 from datagen.errors import DatasetError, FormatError
 from datagen.formats.occlusion import labels_of
 from datagen.formats.pfm import decode_pfm
 from datagen.formats.png import decode_png
-from datagen.frame import FileFrame, StereoFrame
-from datagen.layout import SPLITS
-from datagen.manifest import OWN_DIGEST, FileEntry, check_seal, file_entries
-from datagen.shards import list_shards, local_copy, read_sample_member, shard_index
-from datagen.source import SourceFormat
+from datagen.sources.registry import SourceFormat
+from datagen.sources.stereo_frame import FileFrame, StereoFrame
 
 INDEX_NAME = "index.json"
 META = "meta.json"

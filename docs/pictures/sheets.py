@@ -19,18 +19,18 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from scipy.spatial.transform import Rotation
 
-from datagen.frames import RenderOptions, render_frames
+from datagen.rendering.frames import RenderOptions, render_frames
 from scenes import Scene
-from scenes.materials import FINISHES
-from scenes.mesh import Mesh
-from scenes.motion import quaternion
+from scenes.appearance.materials import FINISHES
+from scenes.geometry.mesh import Mesh
+from scenes.motion.trajectories import quaternion
 from scenes.shapes import SHAPES
-from scenes.shapes.basic import Plane, Superquadric
+from scenes.shapes.solids.basic import Plane, Superquadric
 from scenes.spec import Material, SceneObject, StereoCamera, SunLight, Texture, Trajectory, World
 from scenes.textures import TEXTURES
 from scenes.textures.sky import Sky
 from scenes.textures.tiles import Checkers
-from viewing import Picture
+from stereoforge_kit.viewing import Picture
 
 SIDE, LABEL, GAP, COLUMNS = 96, 11, 6, 10
 """Pixels: of a tile, of the line under it, between tiles; tiles in a row."""

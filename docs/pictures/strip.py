@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 
 from datagen import StereoDataset, StereoSample
-from viewing import (
+from stereoforge_kit.viewing import (
     Picture,
     disparity_picture,
     gradient_picture,

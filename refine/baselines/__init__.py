@@ -1,1 +1,1 @@
-"""The methods that are compared, ours and the baselines: one module each, found by `refine.methods`."""
+"""The methods that are compared, ours and the baselines: one module each, found by `refine.methods.base`."""

@@ -11,12 +11,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from refine.baselines.ours import Ours
-from refine.confidence_shape import ConfidenceShape
-from refine.methods import EvaluationFrame, Method, MethodOutput
-from refine.mrf import SolverName
-from refine.parameters import MRFParameters
-from refine.system import Form
+from refine.energy.confidence_shape import ConfidenceShape
+from refine.energy.parameters import MRFParameters
+from refine.energy.system import Form
+from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.methods.ours import Ours
+from refine.mrf.solve import SolverName
 
 _DIRECT_UP_TO_PIXELS = 200_000
 

@@ -14,8 +14,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg
 
-from matching import fill_nearest
-from refine.methods import EvaluationFrame, Method, MethodOutput
+from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from stereoforge_kit.matching import fill_nearest
 
 Floats = NDArray[np.float64]
 

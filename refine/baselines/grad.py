@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from refine.baselines.ours import Ours
-from refine.confidence_shape import ConfidenceShape
-from refine.methods import EvaluationFrame, Method, MethodOutput
-from refine.parameters import MRFParameters
+from refine.energy.confidence_shape import ConfidenceShape
+from refine.energy.parameters import MRFParameters
+from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.methods.ours import Ours
 
 
 @dataclass(frozen=True)

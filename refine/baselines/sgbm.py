@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from matching import SGBMParameters, fill_background, match_sgbm
-from refine.methods import EvaluationFrame, Method, MethodOutput
+from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from stereoforge_kit.matching import SGBMParameters, fill_background, match_sgbm
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from numba import njit, prange
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from matching import fill_nearest
-from refine.confidence_shape import ConfidenceShape
-from refine.methods import EvaluationFrame, Method, MethodOutput
+from refine.energy.confidence_shape import ConfidenceShape
+from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from stereoforge_kit.matching import fill_nearest
 
 Map = NDArray[np.float32]
 

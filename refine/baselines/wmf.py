@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.methods import EvaluationFrame, Method, MethodOutput
+from refine.methods.base import EvaluationFrame, Method, MethodOutput
 
 LARGEST_SQUARED_DIFFERENCE = 3 * 255**2
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from matching import fill_nearest
 from refine.baselines.wmf import weighted_median
+from stereoforge_kit.matching import fill_nearest
 
 Map = NDArray[np.float32]
 

@@ -14,7 +14,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from refine.forest.features import FEATURES, confidence_features
-from storage import write_bytes
+from stereoforge_kit.files import write_bytes
 
 FORMAT = "1"
 LEAF = -1

@@ -9,9 +9,9 @@ import scipy.sparse as sp
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 from scipy.sparse.linalg import splu
 
+from refine.energy.affinity import Floats
+from refine.energy.system import MRFSystem
 from refine.solvers.linear import LinearSolution, Problem, SolverError
-from refine.system import MRFSystem
-from refine.weights import Floats
 
 BAND_ENTRIES = 1 << 26
 """Largest band that is stored, in numbers of 8 bytes: half a GiB, a square of 320 pixels or 500 x 250."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit, prange
 
+from refine.energy.affinity import Floats
 from refine.solvers.linear import LinearSolution, Problem
 from refine.solvers.stencils import Singles, StencilOperator, System, crop
-from refine.weights import Floats
 
 Preconditioner = Callable[[Singles, Singles], None]
 """Of a residual, a correction into the second array; both padded."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from refine.parameters import MRFParameters
-from refine.system import Form, MRFSystem, build_system
-from refine.weights import Floats
+from refine.energy.affinity import Floats
+from refine.energy.parameters import MRFParameters
+from refine.energy.system import Form, MRFSystem, build_system
 
 
 class SolverError(RuntimeError):

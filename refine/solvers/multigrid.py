@@ -16,6 +16,7 @@ from functools import partial
 import numpy as np
 from numba import njit, prange
 
+from refine.energy.affinity import Floats
 from refine.solvers.chessboard import Coarsening, coarsen
 from refine.solvers.halves import halves, widened
 from refine.solvers.krylov import Iterated, krylov, solve_iteratively
@@ -29,7 +30,6 @@ from refine.solvers.stencils import (
     operator_of,
     system_of,
 )
-from refine.weights import Floats
 
 MAX_ITERATIONS = 1000
 """Without the gradient term and with a large beta, hundreds are needed, and still faster than a direct solve."""

@@ -19,10 +19,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from refine.energy.affinity import NEIGHBORS, Floats
+from refine.energy.system import Form
 from refine.solvers.halves import Halves, widened
 from refine.solvers.linear import Problem, SolverError
-from refine.system import Form
-from refine.weights import NEIGHBORS, Floats
 
 MARGIN = 2
 Singles = NDArray[np.float32]
@@ -228,8 +228,8 @@ def _exponential(t):
 
 @njit(cache=True, parallel=True, fastmath={"contract"})
 def _weigh(image, gradient, first, axial_of, color_of, weights, axial, color):
-    """`refine.weights.edge_weights` and `neighbor_weights`, alpha and beta put in, for the rows from `first` on,
-    and two more above and below."""
+    """`refine.energy.affinity.edge_weights` and `neighbor_weights`, alpha and beta put in, for the rows from `first`
+    on, and two more above and below."""
     height, width = image.shape[:2]
     rows = color.shape[0]
     # Grey values as sums of three channels: integers up to 765, differences exact.

@@ -12,22 +12,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.drawing import chance, choose, uniform
 from scenes.family import Family
-from scenes.own_content import Replaceable
+from scenes.placement.assembly import Assembly
+from scenes.placement.clearance import keep_clear
+from scenes.random_draws import chance, choose, uniform
 from scenes.spec import Light, Scene
-from scenes.streets.assembly import Assembly
-from scenes.streets.clearance import keep_clear
 from scenes.streets.config import DrivingConfig
 from scenes.streets.daylight import sample_daylight
-from scenes.streets.frontage import (
-    DISTRICTS,
-    Side,
-    add_boundary,
-    add_garden,
-    add_houses,
-    add_skyline,
-)
+from scenes.streets.frontage import DISTRICTS, Side, add_boundary, add_garden, add_houses, add_skyline
 from scenes.streets.rig import Drive, sample_camera, sample_drive
 from scenes.streets.roadside import (
     Pavement,
@@ -39,6 +31,7 @@ from scenes.streets.roadside import (
 )
 from scenes.streets.surfaces import lay_ground
 from scenes.streets.traffic import PARKING_M, add_moving, add_parked, sample_fleet
+from scenes.user_assets.replacement import Replaceable
 
 
 def sample_driving(rng: np.random.Generator, config: DrivingConfig) -> Scene:

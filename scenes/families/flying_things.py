@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from scenes.assets import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture
-from scenes.drawing import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.appearance.lights import sample_area_light, sample_sun
+from scenes.appearance.materials import sample_material
 from scenes.family import Family, FamilyConfig
-from scenes.lights import sample_area_light, sample_sun
-from scenes.materials import sample_material
-from scenes.motion import exposure_times, quaternion, shifted, vector, wander
+from scenes.motion.trajectories import exposure_times, quaternion, shifted, vector, wander
+from scenes.random_draws import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.shapes import SHAPES
-from scenes.shapes.organic import Terrain
+from scenes.shapes.solids.organic import Terrain
 from scenes.spec import (
     AreaLight,
     FinalPass,
@@ -37,6 +36,7 @@ from scenes.spec import (
     World,
 )
 from scenes.textures.sky import Sky
+from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture
 
 _SHAPE_FILL = 1.8
 """Mean projected area of the shapes, in squares of their half extent; measured over 300 draws."""

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.drawing import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.appearance.lights import sample_area_light, sample_light_color, sample_sun
+from scenes.appearance.material_textures import Stuff, eye, fur, ground, hide, horn, leaves, rock
+from scenes.appearance.palettes import DRY_GRASS, EARTH, FOLIAGE, MOSS, ROCK, VIVID
 from scenes.family import Family
-from scenes.figures import Coat, Figure, sample_creature
-from scenes.lights import sample_area_light, sample_light_color, sample_sun
-from scenes.motion import vector
-from scenes.outdoors import (
+from scenes.landscapes.characters import Coat, Figure, sample_creature
+from scenes.landscapes.terrain import (
     Land,
     LandscapeConfig,
     half_height,
@@ -26,16 +26,25 @@ from scenes.outdoors import (
     sample_final,
     sample_focus,
 )
-from scenes.own_content import Replaceable
-from scenes.planting import Garden, anywhere, boulders, grass, mushrooms, plants, trees, undergrowth
-from scenes.shapes.landforms import Cavern, Dripstone, Landscape
-from scenes.shapes.plants import Bush, Vine
-from scenes.shapes.trees import Palm, Tree
+from scenes.landscapes.vegetation import (
+    Garden,
+    anywhere,
+    boulders,
+    grass,
+    mushrooms,
+    plants,
+    trees,
+    undergrowth,
+)
+from scenes.motion.trajectories import vector
+from scenes.placement.stage import Spot, Stage
+from scenes.random_draws import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.shapes.nature.landforms import Cavern, Dripstone, Landscape
+from scenes.shapes.nature.plants import Bush, Vine
+from scenes.shapes.nature.trees import Palm, Tree
 from scenes.spec import AreaLight, Light, Scene, World
-from scenes.stage import Spot, Stage
-from scenes.stuffs import Stuff, eye, fur, ground, hide, horn, leaves, rock
 from scenes.textures.sky import Sky
-from scenes.tones import DRY_GRASS, EARTH, FOLIAGE, MOSS, ROCK, VIVID
+from scenes.user_assets.replacement import Replaceable
 
 PLACES = ("jungle", "meadow", "mushrooms", "cave")
 

@@ -15,28 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from scenes.drawing import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
-from scenes.family import Family
-from scenes.figures import Coat, Figure, sample_creature
-from scenes.lights import sample_area_light, sample_sun
-from scenes.outdoors import (
-    Land,
-    LandscapeConfig,
-    half_height,
-    linear,
-    sample_camera,
-    sample_final,
-    sample_focus,
-)
-from scenes.own_content import Replaceable
-from scenes.people import sample_person, statue
-from scenes.planting import Garden, boulders, grass, plants, trees, undergrowth
-from scenes.shapes.landforms import Landscape
-from scenes.shapes.masonry import Archway, BlockWall, Column, House, Steps
-from scenes.shapes.trees import Bamboo, Conifer, Palm, Tree
-from scenes.spec import Light, Scene, World
-from scenes.stage import Spot, Stage
-from scenes.stuffs import (
+from scenes.appearance.lights import sample_area_light, sample_sun
+from scenes.appearance.material_textures import (
     BY_NAME,
     DESERT_ROCK,
     SNOWY,
@@ -51,8 +31,28 @@ from scenes.stuffs import (
     rock,
     roofing,
 )
+from scenes.appearance.palettes import DRY_GRASS, EARTH, HEATH, MOSS, RED_ROCK, ROCK, SAND, SNOW
+from scenes.family import Family
+from scenes.landscapes.characters import Coat, Figure, sample_creature
+from scenes.landscapes.people import sample_person, statue
+from scenes.landscapes.terrain import (
+    Land,
+    LandscapeConfig,
+    half_height,
+    linear,
+    sample_camera,
+    sample_final,
+    sample_focus,
+)
+from scenes.landscapes.vegetation import Garden, boulders, grass, plants, trees, undergrowth
+from scenes.placement.stage import Spot, Stage
+from scenes.random_draws import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
+from scenes.shapes.nature.landforms import Landscape
+from scenes.shapes.nature.masonry import Archway, BlockWall, Column, House, Steps
+from scenes.shapes.nature.trees import Bamboo, Conifer, Palm, Tree
+from scenes.spec import Light, Scene, World
 from scenes.textures.sky import Sky
-from scenes.tones import DRY_GRASS, EARTH, HEATH, MOSS, RED_ROCK, ROCK, SAND, SNOW
+from scenes.user_assets.replacement import Replaceable
 
 PERSON_M = 1.75
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenes.drawing import Count, Range
 from scenes.family import FamilyConfig
+from scenes.random_draws import Count, Range
 
 
 @dataclass(frozen=True)

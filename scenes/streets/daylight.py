@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenes.drawing import chance, log_uniform, uniform
-from scenes.painting import shade
+from scenes.appearance.painting import shade
+from scenes.random_draws import chance, log_uniform, uniform
 from scenes.spec import SunLight, World
 from scenes.streets.config import DrivingConfig
 from scenes.textures.sky import Sky

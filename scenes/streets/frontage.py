@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.drawing import Range, chance, choose, integer, uniform
-from scenes.metric import MetricShape, standing
-from scenes.shapes.boundaries import Fence, Hedge
-from scenes.shapes.buildings import (
+from scenes.placement.assembly import Assembly, by_the_street
+from scenes.random_draws import Range, chance, choose, integer, uniform
+from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.street.boundaries import Fence, Hedge
+from scenes.shapes.street.buildings import (
     CityBlock,
     HouseDesign,
     HouseRoof,
@@ -19,10 +20,9 @@ from scenes.shapes.buildings import (
     HouseWindows,
     ShopFront,
 )
-from scenes.shapes.road import Course
-from scenes.shapes.street_plants import Shrub
-from scenes.streets import finishes
-from scenes.streets.assembly import Assembly, by_the_street
+from scenes.shapes.street.road import Course
+from scenes.shapes.street.roadside_plants import Shrub
+from scenes.streets import materials as finishes
 
 
 @dataclass(frozen=True)

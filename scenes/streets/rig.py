@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.drawing import chance, choose, integer, uniform
-from scenes.motion import quaternion, vector
-from scenes.shapes.road import Course
+from scenes.motion.trajectories import quaternion, vector
+from scenes.random_draws import chance, choose, integer, uniform
+from scenes.shapes.street.road import Course
 from scenes.spec import StereoCamera, Trajectory
 from scenes.streets.config import DrivingConfig
 

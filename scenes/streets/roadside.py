@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.drawing import chance, choose, integer, uniform
-from scenes.metric import MetricShape, standing
-from scenes.shapes.pedestrians import PersonDesign, PersonHair, PersonLegs, PersonSkin, PersonTop
-from scenes.shapes.street_furniture import (
+from scenes.placement.assembly import Assembly, by_the_street
+from scenes.random_draws import chance, choose, integer, uniform
+from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.street.furniture import (
     Bench,
     Bollard,
     BusShelter,
@@ -24,10 +24,10 @@ from scenes.shapes.street_furniture import (
     TrafficLight,
     TrafficLightLens,
 )
-from scenes.shapes.street_plants import TreeCrown, TreeDesign, TreeStem
+from scenes.shapes.street.pedestrians import PersonDesign, PersonHair, PersonLegs, PersonSkin, PersonTop
+from scenes.shapes.street.roadside_plants import TreeCrown, TreeDesign, TreeStem
 from scenes.spec import AreaLight
-from scenes.streets import finishes
-from scenes.streets.assembly import Assembly, by_the_street
+from scenes.streets import materials as finishes
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.drawing import chance, integer, uniform
-from scenes.metric import MetricShape, standing
-from scenes.shapes.road import Course, Field, Kerb, RoadPaint, RoadStrip, Stripe
-from scenes.streets import finishes
-from scenes.streets.assembly import Assembly
+from scenes.placement.assembly import Assembly
+from scenes.random_draws import chance, integer, uniform
+from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.street.road import Course, Field, Kerb, RoadPaint, RoadStrip, Stripe
+from scenes.streets import materials as finishes
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive

@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.drawing import chance, choose, uniform
-from scenes.metric import MetricShape, standing
-from scenes.painting import Srgb, shade
-from scenes.shapes.cars import CarBody, CarDesign, CarGlass, CarLamps, CarTrim
-from scenes.shapes.road import Course
-from scenes.shapes.vans import CargoBox, VanBody, VanDesign, VanGlass, VanLamps, VanTrim
-from scenes.shapes.wheels import MIRROR_M, Wheel, WheelSet
+from scenes.appearance.painting import Srgb, shade
+from scenes.placement.assembly import Assembly
+from scenes.random_draws import chance, choose, uniform
+from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.street.cars import CarBody, CarDesign, CarGlass, CarLamps, CarTrim
+from scenes.shapes.street.road import Course
+from scenes.shapes.street.vans import CargoBox, VanBody, VanDesign, VanGlass, VanLamps, VanTrim
+from scenes.shapes.street.wheels import MIRROR_M, Wheel, WheelSet
 from scenes.spec import SceneObject
-from scenes.streets import finishes
-from scenes.streets.assembly import Assembly
+from scenes.streets import materials as finishes
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive, Lane

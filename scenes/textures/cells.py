@@ -8,8 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.drawing import integer, new_seed, uniform
-from scenes.painting import (
+from scenes.appearance.kernels import nearest_of_grid
+from scenes.appearance.painting import (
     Field,
     Palette,
     Srgb,
@@ -24,7 +24,7 @@ from scenes.painting import (
     to_unit,
     unit_grid,
 )
-from scenes.painting_kernels import nearest_of_grid
+from scenes.random_draws import integer, new_seed, uniform
 from scenes.spec import Texture
 
 

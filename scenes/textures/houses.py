@@ -8,8 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.drawing import chance, choose, integer, new_seed, uniform
-from scenes.painting import (
+from scenes.appearance.painting import (
     Field,
     Palette,
     Picture,
@@ -24,6 +23,7 @@ from scenes.painting import (
     spectral_noise,
     unit_grid,
 )
+from scenes.random_draws import chance, choose, integer, new_seed, uniform
 from scenes.spec import Texture
 
 

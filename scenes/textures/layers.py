@@ -8,8 +8,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.drawing import chance, choose, log_uniform, new_seed, uniform
-from scenes.painting import mix, smooth_step, spectral_noise, to_bytes
+from scenes.appearance.painting import mix, smooth_step, spectral_noise, to_bytes
+from scenes.random_draws import chance, choose, log_uniform, new_seed, uniform
 from scenes.spec import Texture
 from scenes.textures import cells, marks, noise, plain, tiles
 

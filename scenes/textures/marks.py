@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from scenes.drawing import chance, choose, integer, log_uniform, new_seed, uniform
-from scenes.painting import (
+from scenes.appearance.kernels import put_on_top
+from scenes.appearance.painting import (
     Field,
     Palette,
     Picture,
@@ -26,7 +26,7 @@ from scenes.painting import (
     to_unit,
     unit_grid,
 )
-from scenes.painting_kernels import put_on_top
+from scenes.random_draws import chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.spec import Texture
 
 

@@ -8,8 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.drawing import chance, integer, log_uniform, new_seed, uniform
-from scenes.painting import (
+from scenes.appearance.painting import (
     Palette,
     Srgb,
     colorize,
@@ -23,6 +22,7 @@ from scenes.painting import (
     to_unit,
     unit_grid,
 )
+from scenes.random_draws import chance, integer, log_uniform, new_seed, uniform
 from scenes.spec import Texture
 
 

@@ -8,8 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.drawing import new_seed, uniform
-from scenes.painting import (
+from scenes.appearance.painting import (
     Palette,
     Srgb,
     colorize,
@@ -21,6 +20,7 @@ from scenes.painting import (
     to_unit,
     unit_grid,
 )
+from scenes.random_draws import new_seed, uniform
 from scenes.spec import Texture
 
 

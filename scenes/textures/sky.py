@@ -8,8 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.drawing import choose, new_seed, uniform
-from scenes.painting import (
+from scenes.appearance.painting import (
     Field,
     Picture,
     Srgb,
@@ -20,6 +19,7 @@ from scenes.painting import (
     spectral_noise,
     to_bytes,
 )
+from scenes.random_draws import choose, new_seed, uniform
 from scenes.spec import Texture
 
 

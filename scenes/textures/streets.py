@@ -11,8 +11,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.drawing import choose, integer, new_seed, uniform
-from scenes.painting import (
+from scenes.appearance.painting import (
     Field,
     Palette,
     Srgb,
@@ -26,6 +25,7 @@ from scenes.painting import (
     spectral_noise,
     unit_grid,
 )
+from scenes.random_draws import choose, integer, new_seed, uniform
 from scenes.spec import Texture
 from scenes.textures.cells import nearest_seeds
 

@@ -8,8 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.drawing import chance, choose, integer, new_seed, uniform
-from scenes.painting import (
+from scenes.appearance.painting import (
     Field,
     Palette,
     Srgb,
@@ -25,6 +24,7 @@ from scenes.painting import (
     to_unit,
     unit_grid,
 )
+from scenes.random_draws import chance, choose, integer, new_seed, uniform
 from scenes.spec import Texture
 
 

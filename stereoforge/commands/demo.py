@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
+from stereoforge.inputs.flag_values import shown
 from stereoforge.progress import console
-from stereoforge.values import shown
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Demo:
     """Folder for everything."""
 
     def run(self) -> None:
-        from stereoforge.demo import run_demo, summary_table
+        from stereoforge.pipelines.demo import run_demo, summary_table
 
         result = run_demo(self.out)
         console.print(summary_table(result.evaluation, "networks trained just now"))

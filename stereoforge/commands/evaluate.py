@@ -10,10 +10,10 @@ from typing import Annotated, Literal
 
 import tyro
 
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import CommandError, UsageError
+from stereoforge.inputs.flag_values import parse_methods, several, shown
 from stereoforge.progress import console
-from stereoforge.shipped import SHIPPED_WEIGHTS
-from stereoforge.values import parse_methods, several, shown
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Evaluate:
     """Data sets: folders or URLs, with FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
     out: Annotated[Path, shown("REPORT")]
     """Folder for the report."""
-    weights: Annotated[Path, shown("RUN", "the shipped networks")] = SHIPPED_WEIGHTS
+    weights: Annotated[Path, shown("RUN", "the shipped networks")] = BUNDLED_WEIGHTS
     """Run folder of the networks."""
     split: Literal["train", "val", "test"] = "test"
     """Which split of the data sets; those without splits are taken whole."""
@@ -62,21 +62,21 @@ class Evaluate:
             raise UsageError(f"--seed must not be negative, got {self.seed}")
         if self.posterior < 0:
             raise UsageError(f"--posterior must not be negative, got {self.posterior}")
-        from stereoforge.evaluation import (
-            describe_settings,
-            evaluate_set,
-            evaluation_options,
-            open_test_data,
-            report_evaluation,
-        )
-        from stereoforge.prediction import (
+        from stereoforge.pipelines.prediction import (
             fallback_notes,
             open_predictors,
             open_settings,
             untrained,
             untrained_notes,
         )
-        from stereoforge.submission import find_submission_frames, write_submission
+        from stereoforge.pipelines.set_evaluation import (
+            describe_settings,
+            evaluate_set,
+            evaluation_options,
+            open_test_data,
+            report_evaluation,
+        )
+        from stereoforge.pipelines.submission import find_submission_frames, write_submission
 
         data = open_test_data(self.data, self.split)
         to_submit = find_submission_frames(self.data) if self.submission else []

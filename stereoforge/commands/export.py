@@ -8,13 +8,13 @@ from typing import Annotated, Literal
 import tyro
 
 from datagen import StereoDataset
-from datagen.dataset import open_layout
+from datagen.dataset.layout import SPLITS
+from datagen.dataset.samples import open_layout
 from datagen.export import EXPORTERS, ExportOptions
-from datagen.layout import SPLITS
 from stereoforge.errors import CommandError, UsageError
+from stereoforge.inputs.flag_values import shown
 from stereoforge.progress import console, progress_bar
-from stereoforge.values import shown
-from storage import open_tree
+from stereoforge_kit.files import open_tree
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import tyro
 
+from stereoforge.inputs.flag_values import shown
 from stereoforge.progress import console
-from stereoforge.values import shown
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class ExportModel:
     """Folder for stereoforge.onnx and the model card."""
 
     def run(self) -> None:
-        from training.model_card import write_model_card
-        from training.onnx_export import export_model
+        from training.prediction.onnx_export import export_model
+        from training.runs.model_card import write_model_card
 
         exported = export_model(self.run_folder, self.out)
         write_model_card(self.run_folder, self.out)

@@ -10,15 +10,15 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
-from stereoforge.images import read_color_image
+from stereoforge.inputs.flag_values import shown
+from stereoforge.inputs.images import read_color_image
 from stereoforge.progress import console
-from stereoforge.shipped import SHIPPED_WEIGHTS
-from stereoforge.values import shown
 
 if TYPE_CHECKING:
-    from refine.mrf import MRFSolution
-    from training.predict import Prediction
+    from refine.mrf.solve import MRFSolution
+    from training.prediction.predictor import Prediction
 
 POSTERIOR_SAMPLES = 32
 """For --deviation: each pixel's deviation is off by an eighth of itself."""
@@ -49,7 +49,7 @@ class Refine:
     """Right picture, rectified and of the same size."""
     out: Annotated[Path, shown("DIR")]
     """Folder for the results."""
-    weights: Annotated[Path, shown("RUN", "the shipped networks")] = SHIPPED_WEIGHTS
+    weights: Annotated[Path, shown("RUN", "the shipped networks")] = BUNDLED_WEIGHTS
     """Run folder with a regressor, a confnet and a gradnet; for a disparity from elsewhere, with a confnet_free and a
     gradnet_free."""
     disparity: Annotated[Path | None, shown("FILE", "none")] = None
@@ -73,8 +73,8 @@ class Refine:
     def run(self) -> None:
         self._check()
         left, right = read_color_image(self.left), read_color_image(self.right)
-        from stereoforge.disparity_files import read_disparity
-        from stereoforge.prediction import open_settings, predict_pair
+        from stereoforge.inputs.disparity_files import read_disparity
+        from stereoforge.pipelines.prediction import open_settings, predict_pair
 
         given = None
         if self.disparity is not None:
@@ -122,8 +122,8 @@ class Refine:
         deviation: NDArray[np.float32] | None,
     ) -> None:
         from datagen.formats import write_gradient, write_pfm, write_png
-        from datagen.ground_truth import gradient_validity
-        from refine.overview import overview_picture
+        from datagen.ground_truth.labels import gradient_validity
+        from refine.report.overview import overview_picture
 
         refined = solution.disparity.astype("float32")
         assert prediction.confidence is not None
@@ -160,7 +160,7 @@ def _doubts(given: NDArray[np.float32] | None, confidence: NDArray[np.float32]) 
 
 
 def _doubtful_views(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> list[str]:
-    from matching import seem_swapped
+    from stereoforge_kit.matching import seem_swapped
 
     if not seem_swapped(left, right):
         return []

@@ -11,19 +11,19 @@ from rich.markup import escape
 from rich.table import Table
 
 from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dataset
-from datagen.assets import import_assets
-from datagen.estimate import estimate_run
+from datagen.dataset.layout import EXTRA_TARGETS, Layout
+from datagen.dataset.manifest import SceneManifest
 from datagen.executors import Executor
-from datagen.layout import EXTRA_TARGETS, Layout
-from datagen.manifest import SceneManifest
-from datagen.quarantine import QuarantinedScene, quarantined_scenes
-from datagen.render import SCENE_TIMEOUT_S, local_executor, ray_executor
+from datagen.recipe.assets import import_assets
+from datagen.rendering.estimate import estimate_run
+from datagen.rendering.quarantine import QuarantinedScene, quarantined_scenes
+from datagen.rendering.run import SCENE_TIMEOUT_S, local_executor, ray_executor
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
+from stereoforge.inputs.flag_values import parse_histogram, parse_range, parse_shard, parse_size, shown
 from stereoforge.progress import console, progress_bar
-from stereoforge.values import parse_histogram, parse_range, parse_shard, parse_size, shown
-from storage import open_tree, temporary_folder
-from viewing import duration
+from stereoforge_kit.files import open_tree, temporary_folder
+from stereoforge_kit.viewing import duration
 
 DEFAULT_FAMILY = "flying_things"
 DEFAULT_SCENES = 20

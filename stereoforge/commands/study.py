@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from scenes import FAMILIES
 from stereoforge.errors import UsageError
+from stereoforge.inputs.flag_values import parse_counts, parse_methods, parse_size, shown
 from stereoforge.progress import console
-from stereoforge.values import parse_counts, parse_methods, parse_size, shown
 
 if TYPE_CHECKING:
     from stereoforge.study import StudyPlan

@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from stereoforge.errors import UsageError
+from stereoforge.inputs.flag_values import parse_size, parse_weighted_source, several, shown
 from stereoforge.progress import console
-from stereoforge.values import parse_size, parse_weighted_source, several, shown
-from storage import write_bytes
+from stereoforge_kit.files import write_bytes
 
 
 @dataclass(frozen=True)
@@ -96,9 +96,9 @@ class Train:
         if self.task == "rdf":
             self._train_forest([source for source, _ in data])
             return
-        from stereoforge.prediction import open_settings, parameters_file
-        from training.hardware import process_rank
-        from training.train import train, written_by
+        from stereoforge.pipelines.prediction import open_settings, parameters_file
+        from training.runs.hardware import process_rank
+        from training.runs.train import train, written_by
 
         summary = train(
             self.task,
@@ -150,8 +150,8 @@ class Train:
                 raise UsageError(
                     f"--{name} is for networks; a forest is trained at once, on the regressor in --out"
                 )
-        from stereoforge.forest import PLANS, train_forest
-        from stereoforge.prediction import forest_file
+        from stereoforge.pipelines.forest import PLANS, train_forest
+        from stereoforge.pipelines.prediction import forest_file
 
         device = "cpu" if self.device == "auto" else self.device
         forest = train_forest(data, self.out, PLANS[self.preset], self.seed, device)

@@ -9,8 +9,8 @@ from typing import Annotated, ClassVar, Literal
 import tyro
 
 from stereoforge.errors import CommandError, UsageError
+from stereoforge.inputs.flag_values import parse_methods, several, shown
 from stereoforge.progress import console
-from stereoforge.values import parse_methods, several, shown
 
 
 @dataclass(frozen=True)
@@ -49,16 +49,16 @@ class Tune:
         methods = parse_methods(self.methods)
         from rich.table import Table
 
-        from datagen.source import open_source
-        from refine.methods import default_methods
-        from stereoforge.prediction import (
+        from datagen.sources.registry import open_source
+        from refine.methods.registry import default_methods
+        from stereoforge.pipelines.parameter_search import Tuning, describe, shown_values, validation_frames
+        from stereoforge.pipelines.prediction import (
             network_digests,
             open_predictors,
             parameters_file,
             untrained,
             untrained_notes,
         )
-        from stereoforge.tuning import Tuning, describe, shown_values, validation_frames
 
         sources = [open_source(text) for text in self.data]
         predictors = open_predictors(self.weights, self.device, self.predictor)

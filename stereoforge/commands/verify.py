@@ -10,14 +10,14 @@ from typing import Annotated
 
 import tyro
 
-from datagen.manifest import SceneManifest
-from datagen.repair import broken_scenes, problems_left, repair_dataset
-from datagen.scene_check import SAMPLED_PIXELS
-from datagen.verify import verify_dataset
-from datagen.verify_report import VerifyReport
+from datagen.dataset.manifest import SceneManifest
+from datagen.verify.repair import broken_scenes, problems_left, repair_dataset
+from datagen.verify.report import VerifyReport
+from datagen.verify.run import verify_dataset
+from datagen.verify.scene_check import SAMPLED_PIXELS
 from stereoforge.errors import CommandError, UsageError
+from stereoforge.inputs.flag_values import shown
 from stereoforge.progress import console, progress_bar
-from stereoforge.values import shown
 
 PROBLEMS_SHOWN = 50
 

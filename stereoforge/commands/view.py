@@ -9,8 +9,8 @@ from typing import Annotated
 import tyro
 
 from stereoforge.errors import UsageError
+from stereoforge.inputs.flag_values import shown
 from stereoforge.progress import console, progress_bar
-from stereoforge.values import shown
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class View:
             raise UsageError(f"--scenes must be at least 1, got {self.scenes}")
         if self.out.is_dir():
             raise UsageError(f"--out {self.out} is a folder; it takes the file to write")
-        from datagen.comparison import write_comparison
-        from datagen.gallery import write_gallery
+        from datagen.gallery.comparison import write_comparison
+        from datagen.gallery.page import write_gallery
 
         with progress_bar() as progress:
             task = progress.add_task("reading", total=None)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from refine.results import EvaluatedSet, null_nan
+from refine.evaluation.results import EvaluatedSet, null_nan
 
 NAN = float("nan")
 MEASURES = {"epe_all": "EPE, px", "bad_all": "> 1 px, %", "gradient_masked": "gradient error, smooth"}

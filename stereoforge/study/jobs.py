@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from stereoforge.progress import console
-from storage import write_text
-from viewing import duration
+from stereoforge_kit.files import write_text
+from stereoforge_kit.viewing import duration
 
 FINISHED = "finished.json"
 """Written last into a job's folder, with the settings that named it."""

@@ -10,11 +10,11 @@ import cattrs
 import yaml
 
 from datagen import Recipe
-from datagen.recipe import recipe_from_plain
-from refine.methods import default_methods
+from datagen.recipe.recipe import recipe_from_plain
+from refine.methods.registry import default_methods
 from scenes import FAMILIES
 from stereoforge.errors import UsageError
-from stereoforge.forest import PLANS
+from stereoforge.pipelines.forest import PLANS
 from training.presets import find_preset
 
 TRAINING_SPLITS = ("train", "val")
@@ -29,7 +29,7 @@ class DomainPlan:
     """One kind of data: worlds to be rendered, or a data set that is there."""
 
     source: str | None = None
-    """A data set as `datagen.source` takes it; None renders the family of the domain's name."""
+    """A data set as `datagen.sources.registry` takes it; None renders the family of the domain's name."""
     config: dict[str, Any] = field(default_factory=dict)
     """Fields of the family's config that differ from its defaults, `frames` a scene for example; the size is the
     study's."""

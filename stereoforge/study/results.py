@@ -11,16 +11,16 @@ import numpy as np
 import yaml
 from matplotlib.figure import Figure
 
-from refine.report_tables import Cell, Table, number
-from refine.results import EvaluatedSet
-from stereoforge.evaluation import describe_settings, report_evaluation
-from stereoforge.prediction import open_settings
+from refine.evaluation.results import EvaluatedSet
+from refine.report.tables import Cell, Table, number
+from stereoforge.pipelines.prediction import open_settings
+from stereoforge.pipelines.set_evaluation import describe_settings, report_evaluation
 from stereoforge.study.gap import MEASURES, Gap, error_of, gaps, gaps_document, summary
 from stereoforge.study.plan import StudyPlan
 from stereoforge.study.statistics import BIN_PX, QUANTILES, DomainStatistics
-from storage import write_text
-from viewing.html import environment
-from viewing.plots import curves, hoverable, svg_file
+from stereoforge_kit.files import write_text
+from stereoforge_kit.viewing.html import environment
+from stereoforge_kit.viewing.plots import curves, hoverable, svg_file
 
 Cells = Mapping[tuple[str, str], EvaluatedSet]
 
@@ -56,7 +56,7 @@ def write_results(
     sets = [cells[subject, test] for test in plan.test]
     distribution = _distribution(statistics)
     sections = (
-        environment("stereoforge")
+        environment("stereoforge.study")
         .get_template("study.html")
         .render(
             plan=plan,

@@ -13,35 +13,35 @@ from functools import cached_property, partial
 from pathlib import Path
 
 from datagen import Recipe
-from datagen.dataset import open_layout
+from datagen.dataset.samples import open_layout
 from datagen.errors import DatasetError
-from datagen.source import open_source
-from refine.archive import read_evaluation, write_evaluation
-from refine.evaluation import EvaluationOptions
-from refine.methods import table_order
+from datagen.sources.registry import open_source
+from refine.evaluation.archive import read_evaluation, write_evaluation
+from refine.evaluation.evaluate import EvaluationOptions
+from refine.methods.registry import table_order
 from scenes.serialization import to_plain
 from stereoforge.errors import CommandError, UsageError
-from stereoforge.evaluation import TestData, evaluate_set, evaluation_options, family_of
-from stereoforge.forest import PLANS, train_forest
-from stereoforge.prediction import (
+from stereoforge.pipelines.forest import PLANS, train_forest
+from stereoforge.pipelines.parameter_search import VALIDATION, Tuning, validation_frames
+from stereoforge.pipelines.parameter_search import describe as describe_tuning
+from stereoforge.pipelines.prediction import (
     forest_file,
     network_digests,
     open_predictors,
     open_settings,
     parameters_file,
 )
-from stereoforge.rendering import render_all
+from stereoforge.pipelines.rendering import render_all
+from stereoforge.pipelines.set_evaluation import TestData, evaluate_set, evaluation_options, family_of
 from stereoforge.study.jobs import Job, make_job, run_jobs
 from stereoforge.study.plan import NETWORKS, TEST_SPLITS, TRAINING_SPLITS, StudyPlan
 from stereoforge.study.results import StudyResult, write_results
 from stereoforge.study.statistics import describe, read_statistics, write_statistics
-from stereoforge.tuning import VALIDATION, Tuning, validation_frames
-from stereoforge.tuning import describe as describe_tuning
-from storage import alone, write_bytes
-from training.model_card import write_model_card
+from stereoforge_kit.files import alone, write_bytes
 from training.presets import Preset, change_preset, find_preset
-from training.train import train
-from training.weights import copy_weights
+from training.runs.model_card import write_model_card
+from training.runs.train import train
+from training.runs.weights import copy_weights
 
 PANELS = EvaluationOptions(first_panels=2, worst_panels=1)
 """Fewer pictures than `evaluate` shows: there are many sets."""

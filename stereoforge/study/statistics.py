@@ -11,10 +11,10 @@ from pathlib import Path
 import cattrs
 import numpy as np
 
-from datagen.frame import StereoFrame
-from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME
-from datagen.statistics import PIXEL_STEP, textured_share
-from storage import write_text
+from datagen.dataset.statistics import PIXEL_STEP, textured_share
+from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME
+from datagen.sources.stereo_frame import StereoFrame
+from stereoforge_kit.files import write_text
 
 QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
 BIN_PX = 2.0
@@ -40,7 +40,7 @@ class DomainStatistics:
     out_of_frame: float
     """Share of pixels outside the right image."""
     textured: float
-    """Share of pixels with texture around them (`datagen.statistics`)."""
+    """Share of pixels with texture around them (`datagen.dataset.statistics`)."""
 
 
 def describe(frames: Sequence[StereoFrame]) -> DomainStatistics:

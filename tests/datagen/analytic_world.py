@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from datagen.dataset.layout import FIRST_FRAME, Layout
+from datagen.dataset.manifest import FileEntry, SceneManifest, file_entry, read_manifest, write_manifest
 from datagen.formats import write_camera_data, write_gradient, write_occlusion, write_pfm, write_png
-from datagen.layout import FIRST_FRAME, Layout
-from datagen.manifest import FileEntry, SceneManifest, file_entry, read_manifest, write_manifest
-from datagen.recipe import Recipe, write_recipe
+from datagen.recipe.recipe import Recipe, write_recipe
 from scenes import FAMILIES, Scene, scene_to_json
-from scenes.shapes.basic import Plane
+from scenes.shapes.solids.basic import Plane
 from scenes.spec import Material, SceneObject, StereoCamera, Trajectory, World
 from scenes.textures.plain import SolidColor
 

@@ -15,9 +15,9 @@ from typing import Any
 
 from datagen import Recipe
 from datagen.executors import Executor, LocalExecutor, Outcomes, WorkerPolicy
-from datagen.scene_job import SceneJob
+from datagen.rendering.scene_job import SceneJob
 from scenes import FAMILIES
-from workers import Limits
+from stereoforge_kit.processes import Limits
 
 NOT_DATA = ("logs", "quarantine")
 

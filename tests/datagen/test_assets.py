@@ -15,15 +15,15 @@ import pytest
 import trimesh
 
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
-from datagen.assets import ImportedAssets, _import_folder, import_assets
-from datagen.estimate import estimate_run
-from datagen.layout import Layout
-from datagen.manifest import read_manifest
-from datagen.verify import verify_dataset
+from datagen.dataset.layout import Layout
+from datagen.dataset.manifest import read_manifest
+from datagen.recipe.assets import ImportedAssets, _import_folder, import_assets
+from datagen.rendering.estimate import estimate_run
+from datagen.verify.run import verify_dataset
 from scenes import FAMILIES, scene_from_json, scene_to_json
-from scenes.assets import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture, use_store
+from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture, use_store
 from stereoforge.commands.render import Render
-from workers import Limits
+from stereoforge_kit.processes import Limits
 
 RNG = np.random.default_rng(0)
 

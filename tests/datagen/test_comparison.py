@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from datagen import DatasetError, StereoDataset
-from datagen.comparison import write_comparison
+from datagen.dataset.layout import Layout
 from datagen.formats import write_pfm
-from datagen.layout import Layout
+from datagen.gallery.comparison import write_comparison
 from tests.datagen.analytic_world import vouch
 
 

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from datagen import DatasetError, Recipe, render_dataset
-from datagen.curation import Curation, fault_before_rendering, is_textureless
-from datagen.dataset import read_scene
-from datagen.layout import Layout
-from datagen.manifest import read_manifest
-from datagen.raycast import SceneRayCaster
-from datagen.scene_geometry import SceneGeometry
+from datagen.dataset.layout import Layout
+from datagen.dataset.manifest import read_manifest
+from datagen.dataset.samples import read_scene
+from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.recipe.curation import Curation, fault_before_rendering, is_textureless
 from scenes import FAMILIES, Scene, scene_to_json
-from scenes.shapes.basic import Box
+from scenes.shapes.solids.basic import Box
 from scenes.spec import SceneObject, Trajectory
 from tests.datagen.worlds import Plate, plates
 

@@ -9,13 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from datagen import DatasetError, Recipe
-from datagen.curation import Curation
-from datagen.disparity_histogram import Component, DisparityHistogram
-from datagen.gallery import histograms
-from datagen.raycast import SceneRayCaster
-from datagen.recipe import recipe_from_text, recipe_to_text
-from datagen.scene_geometry import SceneGeometry
-from datagen.statistics import SetStatistics
+from datagen.dataset.statistics import SetStatistics
+from datagen.gallery.page import histograms
+from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.recipe.curation import Curation
+from datagen.recipe.disparity_histogram import Component, DisparityHistogram
+from datagen.recipe.recipe import recipe_from_text, recipe_to_text
 from scenes import FAMILIES
 
 WANTED = DisparityHistogram((2.0, 10.0, 20.0, 40.0, 60.0), (0.1, 0.5, 0.3, 0.1))

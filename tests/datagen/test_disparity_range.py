@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from datagen import DatasetError, Recipe
-from datagen.curation import Curation
-from datagen.raycast import SceneRayCaster
-from datagen.scene_geometry import SceneGeometry
+from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.recipe.curation import Curation
 from scenes import FAMILIES, Scene
 
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
-from datagen.estimate import estimate_run
-from datagen.layout import Layout
-from datagen.manifest import read_manifest
-from datagen.recipe import recipe_from_text, write_recipe
+from datagen.dataset.layout import Layout
+from datagen.dataset.manifest import read_manifest
+from datagen.recipe.recipe import recipe_from_text, write_recipe
+from datagen.rendering.estimate import estimate_run
 from scenes import FAMILIES, FamilyConfig
-from scenes.shapes.basic import Box, Superquadric
-from scenes.shapes.revolved import Cylinder
+from scenes.shapes.solids.basic import Box, Superquadric
+from scenes.shapes.solids.revolved import Cylinder
 from stereoforge.cli import main
 
 FOLDER = Path(__file__).parents[2] / "recipes"

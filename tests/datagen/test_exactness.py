@@ -13,11 +13,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from datagen.frames import EyeTargets, RenderOptions, render_frames
-from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
-from datagen.layout import EYES, Eye
-from datagen.raycast import Hits, SceneRayCaster
-from datagen.scene_geometry import SceneGeometry
+from datagen.dataset.layout import EYES, Eye
+from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
+from datagen.ground_truth.raycast import Hits, SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.rendering.frames import EyeTargets, RenderOptions, render_frames
 from scenes import FAMILIES, Scene, sample_scene
 from tests.datagen.oracle import cast_depth, segment_is_blocked, to_camera_frame
 
@@ -96,8 +96,8 @@ def pictures(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 def cycles_disparity(scene: Scene, scratch: Path) -> NDArray[np.float64]:
     """(H, W) the left eye's disparity by Cycles' own depth pass, its pixel filter as narrow as it gets."""
     from datagen.blender.build import build_world, place
+    from datagen.blender.camera import render_channels
     from datagen.blender.session import CyclesSettings, quiet, start_empty_file
-    from datagen.blender.view import render_channels
 
     with quiet(scratch / "log"):
         blender_scene = start_empty_file(CyclesSettings(samples=1))

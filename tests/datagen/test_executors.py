@@ -17,7 +17,7 @@ import pytest
 from datagen.executors import LocalExecutor, WorkerPolicy, supervisor
 from datagen.executors.devices import assign_devices, find_gpus
 from scenes.shapes import SHAPES
-from workers import Limits
+from stereoforge_kit.processes import Limits
 
 
 def misbehave(job: tuple[str, Path]) -> str:

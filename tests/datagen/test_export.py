@@ -13,15 +13,15 @@ import pytest
 import webdataset
 
 from datagen import DatasetError, StereoDataset
+from datagen.dataset.layout import Layout
 from datagen.export import EXPORTERS, ExportOptions
 from datagen.export.kitti import encode_disparity, vehicle_numbers
 from datagen.export.lidar import lidar_mask
-from datagen.layout import Layout
-from datagen.source import open_source
-from datagen.verify import verify_dataset
+from datagen.sources.registry import open_source
+from datagen.verify.run import verify_dataset
 from scenes import sample_scene
 from stereoforge.cli import main
-from storage import open_tree
+from stereoforge_kit.files import open_tree
 
 
 def export(data: Path, kind: str, out: Path, *flags: str) -> None:

@@ -17,8 +17,8 @@ import pytest
 
 from datagen import render_dataset
 from datagen.errors import DiskFullError
-from datagen.recipe import write_recipe
-from datagen.staging import STAGING_FOLDER
+from datagen.recipe.recipe import write_recipe
+from datagen.rendering.staging import STAGING_FOLDER
 from scenes import Scene
 from scenes.serialization import from_plain
 from stereoforge.cli import main

@@ -10,16 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 from datagen.blender.build import BuiltWorld, build_world, place
-from datagen.blender.final import HAZE_HEIGHT, render_final
+from datagen.blender.camera import render_radiance
+from datagen.blender.final_pass import HAZE_HEIGHT, render_final
 from datagen.blender.session import CyclesSettings, quiet, start_empty_file
-from datagen.blender.view import render_radiance
-from datagen.final_pass import Sensor, vignette
-from datagen.frames import EyeTargets, RenderOptions, render_frames
-from datagen.layout import EYES, Eye
-from datagen.scene_geometry import SceneGeometry
+from datagen.dataset.layout import EYES, Eye
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.rendering.frames import EyeTargets, RenderOptions, render_frames
+from datagen.rendering.sensor import Sensor, vignette
 from scenes import Scene
-from scenes.deformations.sway import Sway
-from scenes.shapes.basic import Box, Plane
+from scenes.motion.deformations.sway import Sway
+from scenes.shapes.solids.basic import Box, Plane
 from scenes.spec import FinalPass, Fog, Material, SceneObject, StereoCamera, Trajectory, World
 from scenes.textures.plain import SolidColor
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from datagen.dataset.manifest import FileEntry, SceneManifest, read_manifest, write_manifest
 from datagen.errors import DatasetError
 from datagen.formats import (
     read_camera_data,
@@ -27,7 +28,6 @@ from datagen.formats import (
     write_pfm,
     write_png,
 )
-from datagen.manifest import FileEntry, SceneManifest, read_manifest, write_manifest
 
 RNG = np.random.default_rng(0)
 WRITERS: dict[str, tuple[Callable[[Path], None], Callable[[Path], Any]]] = {

@@ -11,12 +11,12 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 
-from datagen.dataset import StereoDataset
+from datagen.dataset.layout import Layout
+from datagen.dataset.samples import StereoDataset
 from datagen.errors import DatasetError
-from datagen.gallery import evenly_spaced, write_gallery
-from datagen.layout import Layout
+from datagen.gallery.page import evenly_spaced, write_gallery
+from stereoforge_kit.viewing import index_picture
 from tests.datagen.analytic_world import make_scene, render, write_dataset
-from viewing import index_picture
 
 
 @pytest.fixture(scope="module")

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import pytest
 
+from datagen.dataset.manifest import read_manifest
+from datagen.dataset.shards import read_sample_member, shard_index
 from datagen.errors import DatasetError
 from datagen.formats import read_gradient, read_pfm, read_png
 from datagen.formats.picture import read_picture
 from datagen.formats.png import read_png_size
-from datagen.manifest import read_manifest
-from datagen.recipe import read_recipe
-from datagen.shards import read_sample_member, shard_index
-from datagen.source import open_source
-from datagen.verify_report import Problem
-from workers import call_limited
+from datagen.recipe.recipe import read_recipe
+from datagen.sources.registry import open_source
+from datagen.verify.report import Problem
+from stereoforge_kit.processes import call_limited
 
 
 def tar_header(kind: bytes, size: bytes, content: bytes = b"") -> bytes:

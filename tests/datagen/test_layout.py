@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from datagen.dataset.layout import FIRST_FRAME, KINDS, Layout
 from datagen.errors import DatasetError
-from datagen.layout import FIRST_FRAME, KINDS, Layout
 
 LAYOUT = Layout(Path("/data"))
 

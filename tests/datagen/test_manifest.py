@@ -12,8 +12,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from datagen.dataset.manifest import (
+    FileEntry,
+    SceneManifest,
+    file_entry,
+    read_manifest,
+    seal,
+    write_manifest,
+)
 from datagen.errors import DatasetError
-from datagen.manifest import FileEntry, SceneManifest, file_entry, read_manifest, seal, write_manifest
 
 DIGEST = "0123456789abcdef" * 4
 EXAMPLE = SceneManifest(

@@ -10,14 +10,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from datagen.frames import EyeTargets, RenderOptions, render_frames
-from datagen.layout import EYES, Eye
-from datagen.raycast import SceneRayCaster
-from datagen.scene_geometry import SceneGeometry
+from datagen.dataset.layout import EYES, Eye
+from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.rendering.frames import EyeTargets, RenderOptions, render_frames
 from scenes import Scene
-from scenes.deformations.sway import Sway
-from scenes.motion import quaternion
-from scenes.shapes.basic import Superquadric
+from scenes.motion.deformations.sway import Sway
+from scenes.motion.trajectories import quaternion
+from scenes.shapes.solids.basic import Superquadric
 from scenes.spec import SceneObject, Trajectory
 from tests.datagen.oracle import cast_depth, to_camera_frame
 from tests.datagen.worlds import Plate, plates
@@ -110,8 +110,8 @@ def test_a_frame_looks_the_same_whatever_was_rendered_before(
 ) -> None:
     """Shading normals and Cycles' kept geometry follow the deformation, not only the depth."""
     from datagen.blender.build import build_world
+    from datagen.blender.camera import render_view
     from datagen.blender.session import CyclesSettings, quiet, start_empty_file
-    from datagen.blender.view import render_view
 
     assert BALL.mesh().smooth
     radiance = []

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from datagen.frames import EyeTargets, render_frames
-from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, VISIBLE
-from datagen.layout import Eye
+from datagen.dataset.layout import Eye
+from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.rendering.frames import EyeTargets, render_frames
 from tests.datagen.worlds import BASELINE_M, Plate, plates
 
 WIDTH, HEIGHT = 192, 108

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from datagen import DatasetError, Recipe, render_dataset
-from datagen.curation import Curation
-from datagen.pilot import check_device, check_disparity_range
+from datagen.recipe.curation import Curation
+from datagen.rendering.preflight import check_device, check_disparity_range
 from scenes import FAMILIES
 
 NO_DEVICE = "metal"

@@ -13,11 +13,11 @@ import ray
 from ray.cluster_utils import Cluster
 
 from datagen import render_dataset
+from datagen.dataset.manifest import SceneManifest
 from datagen.executors import RayExecutor, WorkerPolicy
-from datagen.manifest import SceneManifest
+from stereoforge_kit.processes import Limits
 from tests.datagen.sabotage import RECIPE, hashes
 from tests.datagen.test_executors import misbehave
-from workers import Limits
 
 FIRST, SECOND = "127.0.0.2", "127.0.0.3"
 """Addresses of this machine alone; Ray would replace 127.0.0.1 by one that others can reach."""

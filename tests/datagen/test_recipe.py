@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from datagen import DatasetError, Recipe
-from datagen.recipe import merge_into
+from datagen.recipe.recipe import merge_into
 from scenes import FAMILIES
 
 

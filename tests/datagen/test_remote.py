@@ -16,13 +16,13 @@ import s3fs
 from moto.server import ThreadedMotoServer
 
 from datagen import DatasetError, StereoDataset, render_dataset
+from datagen.dataset.layout import Layout
+from datagen.dataset.shards import CACHE_VARIABLE
 from datagen.executors import Failure, Outcome
 from datagen.executors.base import Outcomes
-from datagen.layout import Layout
-from datagen.shards import CACHE_VARIABLE
-from datagen.verify import verify_dataset
+from datagen.verify.run import verify_dataset
 from stereoforge.cli import main
-from storage import Tree, open_tree
+from stereoforge_kit.files import Tree, open_tree
 from tests.datagen.analytic_world import vouch
 from tests.datagen.sabotage import ONE_WORKER, RECIPE, Sabotage, hashes, without
 

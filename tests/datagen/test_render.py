@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
-from datagen.layout import Layout
+from datagen.dataset.layout import Layout
 from scenes import FAMILIES
 from tests.datagen.sabotage import hashes
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from datagen.dataset.layout import Layout
 from datagen.executors import Failure
-from datagen.layout import Layout
-from datagen.quarantine import put_in_quarantine
+from datagen.rendering.quarantine import put_in_quarantine
 from stereoforge.cli import main
-from storage import LocalTree
+from stereoforge_kit.files import LocalTree
 from tests.datagen.sabotage import RECIPE, hashes
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen.dataset import StereoDataset
-from datagen.statistics import measure, textured_share
+from datagen.dataset.samples import StereoDataset
+from datagen.dataset.statistics import measure, textured_share
 from tests.datagen.analytic_world import make_scene, render
 
 

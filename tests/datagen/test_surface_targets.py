@@ -15,17 +15,17 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
 from datagen import DatasetError, Recipe, StereoDataset, StereoSample, render_dataset
+from datagen.dataset.layout import DIRECTIONS, EXTRA_TARGETS, EYES, Direction, Eye, Layout
+from datagen.dataset.manifest import file_entry, read_manifest, write_manifest
 from datagen.formats import write_flow, write_mask, write_normals, write_pfm, write_png
-from datagen.gallery import write_gallery
-from datagen.layout import DIRECTIONS, EXTRA_TARGETS, EYES, Direction, Eye, Layout
-from datagen.manifest import file_entry, read_manifest, write_manifest
-from datagen.raycast import SceneRayCaster
-from datagen.scene_geometry import SceneGeometry
-from datagen.surface_targets import STEP, PixelSurfaces
-from datagen.verify import verify_dataset
+from datagen.gallery.page import write_gallery
+from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.targets import STEP, PixelSurfaces
+from datagen.verify.run import verify_dataset
 from scenes import FAMILIES, Scene
-from scenes.motion import quaternion
-from scenes.shapes.basic import Plane
+from scenes.motion.trajectories import quaternion
+from scenes.shapes.solids.basic import Plane
 from scenes.spec import Deformation, Material, SceneObject, StereoCamera, Trajectory
 from scenes.textures.plain import SolidColor
 from tests.datagen.worlds import plates

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from datagen.dataset import StereoDataset
+from datagen.dataset.layout import Layout
+from datagen.dataset.manifest import file_entry, read_manifest
+from datagen.dataset.samples import StereoDataset
 from datagen.errors import DatasetError
 from datagen.formats import (
     read_camera_data,
@@ -24,12 +26,10 @@ from datagen.formats import (
     write_pfm,
     write_png,
 )
-from datagen.ground_truth import forward_differences, gradient_validity
-from datagen.layout import Layout
-from datagen.manifest import file_entry, read_manifest
-from datagen.recipe import read_recipe
-from datagen.verify import FEW_SCENES, verify_dataset
-from datagen.verify_report import VerifyReport
+from datagen.ground_truth.labels import forward_differences, gradient_validity
+from datagen.recipe.recipe import read_recipe
+from datagen.verify.report import VerifyReport
+from datagen.verify.run import FEW_SCENES, verify_dataset
 from tests.datagen.analytic_world import commit, write_dataset
 
 

@@ -9,17 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from scenes.shapes.basic import Plane
-from scenes.spec import (
-    Material,
-    Scene,
-    SceneObject,
-    StereoCamera,
-    SunLight,
-    Texture,
-    Trajectory,
-    World,
-)
+from scenes.shapes.solids.basic import Plane
+from scenes.spec import Material, Scene, SceneObject, StereoCamera, SunLight, Texture, Trajectory, World
 from scenes.textures.plain import SolidColor
 
 FOCAL_MM = 32.0

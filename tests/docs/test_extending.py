@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from datagen.curation import fault_before_rendering
 from datagen.formats import write_pfm, write_png
-from datagen.raycast import SceneRayCaster
-from datagen.recipe import Recipe
-from datagen.scene_geometry import SceneGeometry
-from refine.methods import EvaluationFrame
+from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.recipe.curation import fault_before_rendering
+from datagen.recipe.recipe import Recipe
+from refine.methods.base import EvaluationFrame
 from scenes import scene_from_json, scene_to_json
-from scenes.drawing import integer
+from scenes.random_draws import integer
 
 PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)

@@ -13,20 +13,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from matching import SGBMParameters
 from refine import MRFParameters, refine_disparity
 from refine.baselines.color import Color
 from refine.baselines.fbs import FBS
 from refine.baselines.grad import Grad
-from refine.baselines.ours import Ours
-from refine.baselines.ours_conf_gt import OursConfGT
 from refine.baselines.regressor_f import RegressorF
 from refine.baselines.sgbm import SGBM
 from refine.baselines.tgv import TGV
 from refine.baselines.wmf import WMF, weighted_median
-from refine.confidence_shape import ConfidenceShape
-from refine.evaluation import EvaluationFrame, evaluate
-from refine.methods import default_methods, known_methods
+from refine.energy.confidence_shape import ConfidenceShape
+from refine.evaluation.evaluate import EvaluationFrame, evaluate
+from refine.methods.ours import Ours
+from refine.methods.ours_conf_gt import OursConfGT
+from refine.methods.registry import default_methods, known_methods
+from stereoforge_kit.matching import SGBMParameters
 from tests.refine.oracles import dense_minimiser
 from tests.refine.worlds import random_problem, toy_frame
 from tests.training.synthetic import random_pair

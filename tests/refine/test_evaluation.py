@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from refine import MRFParameters, refine_disparity
-from refine.baselines.gradnet import GradNet
-from refine.baselines.ours import Ours
-from refine.baselines.ours_conf_gt import OursConfGT
-from refine.baselines.regressor import Regressor
-from refine.evaluation import EvaluationFrame, EvaluationOptions, evaluate
-from refine.methods import Method, MethodOutput, default_methods, known_methods
+from refine.evaluation.evaluate import EvaluationFrame, EvaluationOptions, evaluate
+from refine.methods.base import Method, MethodOutput
+from refine.methods.gradnet import GradNet
+from refine.methods.ours import Ours
+from refine.methods.ours_conf_gt import OursConfGT
+from refine.methods.registry import default_methods, known_methods
+from refine.methods.regressor import Regressor
 from refine.metrics import (
     bad_pixel_rate,
     end_point_error,
@@ -24,7 +25,7 @@ from refine.metrics import (
     gradient_error,
     sparsification_curve,
 )
-from refine.posterior import posterior_deviation
+from refine.mrf.posterior import posterior_deviation
 from tests.refine.worlds import toy_frame
 
 MAIN_ROWS = default_methods(("regressor", "gradnet", "ours", "ours_conf_gt"))

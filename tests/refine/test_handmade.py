@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from matching import SGBMParameters, left_right_consistency, match_both
-from refine.handmade import UNCONFIRMED, consistency_confidence, local_slopes
+from refine.heuristic_inputs import UNCONFIRMED, consistency_confidence, local_slopes
+from stereoforge_kit.matching import SGBMParameters, left_right_consistency, match_both
 from tests.refine.worlds import random_problem
 from tests.training.synthetic import random_pair
 

@@ -10,8 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from refine import ConvergenceWarning, MRFParameters, SolverError, refine_disparity, solve_mrf
+from refine.energy.affinity import NEIGHBORS
 from refine.metrics import forward_gradient
-from refine.weights import NEIGHBORS
 from tests.refine.oracles import dense_minimiser, dense_paper_solution
 from tests.refine.worlds import Problem, random_problem, toy_frame
 

@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from refine import MRFParameters, SolverError, solve_mrf
-from refine.differentiable import ImageWeights, image_weights, refine_batch
-from refine.weights import edge_weights, neighbor_weights
+from refine.energy.affinity import edge_weights, neighbor_weights
+from refine.mrf.torch.differentiable import ImageWeights, image_weights, refine_batch
 from tests.refine.worlds import Problem, random_problem
 
 FORMS = ["exact", "paper"]
@@ -19,7 +19,7 @@ TIGHT = 1e-12
 def solver(request, monkeypatch):
     """The exact form as on CPUs, and as on other devices."""
     if request.param == "torch":
-        monkeypatch.setattr("refine.differentiable._has_kernels", lambda *_: False)
+        monkeypatch.setattr("refine.mrf.torch.differentiable._has_kernels", lambda *_: False)
 
 
 def batch(problems: list[Problem]) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:

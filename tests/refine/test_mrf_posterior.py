@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from refine import MRFParameters
-from refine.mrf import checked_problem
-from refine.posterior import posterior_deviation
+from refine.mrf.posterior import posterior_deviation
+from refine.mrf.solve import checked_problem
 from tests.refine.worlds import random_problem
 
 

@@ -11,17 +11,17 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from refine.archive import read_evaluation, write_evaluation
 from refine.baselines.wmf import WMF
-from refine.bootstrap import bootstrap
-from refine.evaluation import EvaluationFrame, evaluate
-from refine.methods import default_methods
+from refine.evaluation.archive import read_evaluation, write_evaluation
+from refine.evaluation.bootstrap import bootstrap
+from refine.evaluation.evaluate import EvaluationFrame, evaluate
+from refine.evaluation.results import EvaluatedSet, results_csv, results_json
+from refine.methods.registry import default_methods
 from refine.metrics import kitti_d1
-from refine.paper import PAPER, counterpart
-from refine.paper_tables import paper_tables
-from refine.report import ReportContext, write_report
-from refine.results import EvaluatedSet, results_csv, results_json
-from refine.table_files import tables_csv, tables_json, tables_latex, tables_markdown
+from refine.report.paper_tables import paper_tables
+from refine.report.published import PAPER, counterpart
+from refine.report.table_files import tables_csv, tables_json, tables_latex, tables_markdown
+from refine.report.write import ReportContext, write_report
 from tests.refine.worlds import toy_frame
 
 ROWS = default_methods(

@@ -12,12 +12,12 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 
-from refine.evaluation import EvaluationOptions, evaluate
-from refine.lens import most_improved_boundary, worst_boundary
-from refine.methods import default_methods
-from refine.overview import overview_picture
-from refine.report import ReportContext, write_report
-from refine.results import EvaluatedSet
+from refine.evaluation.evaluate import EvaluationOptions, evaluate
+from refine.evaluation.results import EvaluatedSet
+from refine.methods.registry import default_methods
+from refine.report.crop_selection import most_improved_boundary, worst_boundary
+from refine.report.overview import overview_picture
+from refine.report.write import ReportContext, write_report
 from tests.refine.worlds import toy_frame
 
 MAIN_ROWS = default_methods(("regressor", "gradnet", "ours", "ours_conf_gt"))

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from refine import MRFParameters, refine_disparity, solve_mrf
-from refine.baselines.ours import Ours
-from refine.baselines.ours_quadratic import OursQuadratic
-from refine.confidence_shape import ConfidenceShape
-from refine.robust import gradient_factor, solve_robust
+from refine.energy.confidence_shape import ConfidenceShape
+from refine.methods.ours import Ours
+from refine.methods.ours_quadratic import OursQuadratic
+from refine.mrf.robust import gradient_factor, solve_robust
 from tests.refine.oracles import robust_energy, robust_minimiser
 from tests.refine.worlds import random_problem, toy_frame
 

@@ -9,13 +9,22 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from refine.baselines.ours import Ours
-from refine.baselines.ours_conf_gt import OursConfGT
 from refine.baselines.wmf import WMF
-from refine.methods import EvaluationFrame, Method, MethodOutput, default_methods
-from refine.parameters import MRFParameters
-from refine.settings import read_settings, write_settings
-from refine.tuning import Errors, Trial, TunedMethod, measure, objective_of, tune_method, with_value
+from refine.energy.parameters import MRFParameters
+from refine.evaluation.settings import read_settings, write_settings
+from refine.evaluation.tuning import (
+    Errors,
+    Trial,
+    TunedMethod,
+    measure,
+    objective_of,
+    tune_method,
+    with_value,
+)
+from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.methods.ours import Ours
+from refine.methods.ours_conf_gt import OursConfGT
+from refine.methods.registry import default_methods
 from tests.refine.worlds import toy_frame
 
 
@@ -102,7 +111,7 @@ def test_a_search_goes_on_from_earlier_trials():
 def test_measures_are_those_of_the_tables():
     frames = [toy_frame(seed, 20, 30) for seed in (0, 1)]
     errors = measure(WMF(radius_px=3), frames)
-    from refine.evaluation import evaluate
+    from refine.evaluation.evaluate import evaluate
 
     score = evaluate(frames, [WMF(radius_px=3)]).scores["wmf"]
     assert errors == Errors(score.regions["all"].bad, score.regions["all"].epe, score.gradient_masked)

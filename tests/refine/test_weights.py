@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from refine.weights import NEIGHBORS, edge_weights, neighbor_weights
+from refine.energy.affinity import NEIGHBORS, edge_weights, neighbor_weights
 from tests.refine.oracles import levin_weights
 
 images = st.tuples(st.integers(1, 6), st.integers(1, 6)).flatmap(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from refine.evaluation import EvaluationFrame
+from refine.evaluation.evaluate import EvaluationFrame
 
 
 @dataclass(frozen=True)

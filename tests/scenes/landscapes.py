@@ -8,8 +8,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from datagen.raycast import SceneRayCaster
-from datagen.scene_geometry import SceneGeometry
+from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
 from scenes.spec import Scene
 
 

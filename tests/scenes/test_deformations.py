@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from scenes.deformations import DEFORMATIONS
-from scenes.deformations.articulated import Articulated, Joint
-from scenes.deformations.sway import Sway
-from scenes.figures import Coat, Figure, sample_creature
-from scenes.people import sample_person
+from scenes.landscapes.characters import Coat, Figure, sample_creature
+from scenes.landscapes.people import sample_person
+from scenes.motion.deformations import DEFORMATIONS
+from scenes.motion.deformations.articulated import Articulated, Joint
+from scenes.motion.deformations.sway import Sway
 from scenes.serialization import from_plain, to_plain
 from scenes.spec import Deformation
 

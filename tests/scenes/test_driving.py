@@ -13,10 +13,10 @@ from scipy.spatial import ConvexHull
 
 from scenes import sample_scene, scene_from_json, scene_to_json
 from scenes.families.driving import DrivingConfig
-from scenes.shapes.cars import CarBody
-from scenes.shapes.road import Course, RoadStrip
-from scenes.shapes.vans import VanBody
-from scenes.shapes.wheels import Wheel
+from scenes.shapes.street.cars import CarBody
+from scenes.shapes.street.road import Course, RoadStrip
+from scenes.shapes.street.vans import VanBody
+from scenes.shapes.street.wheels import Wheel
 from scenes.spec import Scene, SceneObject
 
 SMALL = DrivingConfig(width=96, height=54)

@@ -11,7 +11,7 @@ from scipy.sparse import lil_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
-from scenes.geometry import (
+from scenes.geometry.building import (
     box_uv,
     extrude_triangles,
     fit_to_cube,

@@ -10,7 +10,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenes.implicit import blended_capsules, capsule_distances, surface_net
+from scenes.geometry.implicit_surfaces import blended_capsules, capsule_distances, surface_net
 
 seeds = st.integers(0, 2**32 - 1)
 

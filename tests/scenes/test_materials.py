@@ -7,8 +7,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from scenes.lights import sample_area_light, sample_light_color, sample_sun
-from scenes.materials import FINISHES, TEXEL_PX, sample_material, sample_texture
+from scenes.appearance.lights import sample_area_light, sample_light_color, sample_sun
+from scenes.appearance.materials import FINISHES, TEXEL_PX, sample_material, sample_texture
 from scenes.textures import TEXTURES
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from scenes.painting import finish, mix, smooth_step, to_bytes, unit_grid
+from scenes.appearance.painting import finish, mix, smooth_step, to_bytes, unit_grid
 from scenes.textures.cells import nearest_seeds
 from scenes.textures.marks import heap_of_figures
 

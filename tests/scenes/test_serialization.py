@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from scenes import FAMILIES, FamilyConfig, sample_scene, scene_from_json, scene_to_json
-from scenes.deformations.sway import Sway
 from scenes.families.flying_things import FlyingThingsConfig
+from scenes.motion.deformations.sway import Sway
 from scenes.serialization import from_plain, to_plain
 from scenes.spec import FinalPass, Fog, Scene
 

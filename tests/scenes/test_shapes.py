@@ -12,15 +12,15 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenes.mesh import Mesh
-from scenes.metric import MetricShape
+from scenes.geometry.mesh import Mesh
 from scenes.serialization import from_plain, to_plain
 from scenes.shapes import SHAPES
-from scenes.shapes.basic import Box, Ellipsoid
-from scenes.shapes.extruded import HoledPlate
-from scenes.shapes.organic import Terrain
-from scenes.shapes.revolved import Cylinder, Torus
-from scenes.shapes.wires import Lattice
+from scenes.shapes.metric import MetricShape
+from scenes.shapes.solids.basic import Box, Ellipsoid
+from scenes.shapes.solids.extruded import HoledPlate
+from scenes.shapes.solids.organic import Terrain
+from scenes.shapes.solids.revolved import Cylinder, Torus
+from scenes.shapes.solids.wires import Lattice
 from scenes.spec import Shape
 
 SOLIDS = sorted(name for name in SHAPES if name != "Plane")

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from datagen.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import SceneGeometry
 from scenes import sample_scene
 from scenes.families.sintel import SintelConfig
-from scenes.outdoors import NEAREST_SHARE
+from scenes.landscapes.terrain import NEAREST_SHARE
 from scenes.serialization import scene_from_json, scene_to_json
 from scenes.spec import Scene
 from tests.scenes.landscapes import encloses, ground_below, heights_of_feet, look, nearest_m, world_vertices

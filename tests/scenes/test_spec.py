@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
 from scenes import discovery
-from scenes.motion import exposure_times, key_times, quaternion, shifted, wander
-from scenes.shapes.basic import Box
+from scenes.motion.trajectories import exposure_times, key_times, quaternion, shifted, wander
+from scenes.shapes.solids.basic import Box
 from scenes.spec import SceneObject, StereoCamera, Texture, Trajectory
 from scenes.textures.plain import SolidColor
 

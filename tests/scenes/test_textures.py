@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from scenes.painting import finish, oklch_to_srgb, sample_palette, spectral_noise
+from scenes.appearance.painting import finish, oklch_to_srgb, sample_palette, spectral_noise
 from scenes.serialization import from_plain, to_plain
 from scenes.spec import Texture
 from scenes.textures import TEXTURES

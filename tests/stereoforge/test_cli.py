@@ -21,13 +21,13 @@ import pytest
 
 from datagen import StereoDataset
 from datagen.formats import read_pfm
-from refine.methods import known_methods
-from refine.settings import read_settings
-from refine.tuning import measure
+from refine.evaluation.settings import read_settings
+from refine.evaluation.tuning import measure
+from refine.methods.registry import known_methods
 from stereoforge.cli import main
 from stereoforge.commands import COMMANDS, command_class, command_summary
-from stereoforge.demo import DemoPlan, DemoResult, run_demo
-from stereoforge.prediction import open_predictors
+from stereoforge.pipelines.demo import DemoPlan, DemoResult, run_demo
+from stereoforge.pipelines.prediction import open_predictors
 
 RenderTiny = ["render", "--scenes", "1", "--size", "64x36", "--samples", "1", "--workers", "1"]
 
@@ -348,18 +348,22 @@ def test_damaged_files_are_named_wherever_they_are_read(
 INTERRUPTED = [
     (
         ("train", "regressor", "--data", "set", "--out", "run"),
-        "training.train.train",
+        "training.runs.train.train",
         "with --resume continues",
     ),
     (
         ("train", "rdf", "--data", "set", "--out", "run"),
-        "stereoforge.forest.train_forest",
+        "stereoforge.pipelines.forest.train_forest",
         "nothing was written",
     ),
-    (("demo",), "stereoforge.demo.run_demo", "continues where it stopped"),
+    (("demo",), "stereoforge.pipelines.demo.run_demo", "continues where it stopped"),
     (("study", "--plan", "p", "--out", "s"), "stereoforge.study.read_plan", "continues where it stopped"),
-    (("evaluate", "set", "--out", "r"), "stereoforge.evaluation.open_test_data", "starts anew"),
-    (("tune", "set", "--weights", "run"), "datagen.source.open_source", "continues where it stopped"),
+    (("evaluate", "set", "--out", "r"), "stereoforge.pipelines.set_evaluation.open_test_data", "starts anew"),
+    (
+        ("tune", "set", "--weights", "run"),
+        "datagen.sources.registry.open_source",
+        "continues where it stopped",
+    ),
 ]
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from datagen import DatasetError
 from datagen.formats import write_pfm, write_png
-from stereoforge.disparity_files import read_disparity
 from stereoforge.errors import CommandError
+from stereoforge.inputs.disparity_files import read_disparity
 
 NAN = np.nan
 

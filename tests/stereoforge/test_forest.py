@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 import torch
 
-from datagen.source import open_source
+from datagen.sources.registry import open_source
 from refine.forest import load_forest
 from refine.forest.fitting import ForestConfig
 from stereoforge.cli import main
 from stereoforge.errors import CommandError
-from stereoforge.forest import ForestPlan, train_forest
-from stereoforge.prediction import open_predictors
+from stereoforge.pipelines.forest import ForestPlan, train_forest
+from stereoforge.pipelines.prediction import open_predictors
 from tests.training.synthetic import write_dataset
 from training.networks import DispNetConfig, DispNetCorr1D
-from training.weights import TrainingSummary, save_weights
+from training.runs.weights import TrainingSummary, save_weights
 
 
 @pytest.fixture(scope="module")

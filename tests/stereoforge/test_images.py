@@ -10,7 +10,7 @@ import pytest
 
 from datagen.formats import write_pfm
 from stereoforge.errors import CommandError
-from stereoforge.images import read_color_image
+from stereoforge.inputs.images import read_color_image
 
 COLORS = np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8)
 

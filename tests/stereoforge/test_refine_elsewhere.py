@@ -12,7 +12,7 @@ from stereoforge.cli import main
 from tests.training.synthetic import random_pair
 from training.networks import ConfNet, GradNet
 from training.presets import FreeConfNetPreset, FreeGradNetPreset, find_preset
-from training.weights import TrainingSummary, save_weights
+from training.runs.weights import TrainingSummary, save_weights
 
 
 @pytest.fixture(scope="module")

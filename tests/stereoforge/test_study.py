@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 import yaml
 
-from refine.evaluation import evaluate
-from refine.methods import default_methods
-from refine.results import EvaluatedSet
+from refine.evaluation.evaluate import evaluate
+from refine.evaluation.results import EvaluatedSet
+from refine.methods.registry import default_methods
 from scenes import FAMILIES
 from stereoforge.cli import main
 from stereoforge.errors import CommandError, UsageError
@@ -22,7 +22,7 @@ from stereoforge.study import DomainPlan, StudyPlan, StudyResult, read_plan, run
 from stereoforge.study.gap import Gap, gaps, summary
 from stereoforge.study.jobs import Job, make_job, run_jobs
 from stereoforge.study.plan import NETWORKS
-from storage import alone
+from stereoforge_kit.files import alone
 from tests.refine.worlds import toy_frame
 from tests.stereoforge.test_submission import kitti_set
 from training.presets import Preset, find_preset

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from datagen.formats import read_png, write_png
-from datagen.frame import StereoFrame
-from refine.baselines.regressor import Regressor
-from refine.bootstrap import bootstrap
-from refine.evaluation import EvaluationFrame
-from refine.paper_tables import paper_tables
+from datagen.sources.stereo_frame import StereoFrame
+from refine.evaluation.bootstrap import bootstrap
+from refine.evaluation.evaluate import EvaluationFrame
+from refine.methods.regressor import Regressor
+from refine.report.paper_tables import paper_tables
 from stereoforge.errors import UsageError
-from stereoforge.evaluation import evaluate_set, evaluation_options, open_test_data
-from stereoforge.prediction import Image, Predictors
-from stereoforge.submission import encode_disparity, find_submission_frames, write_submission
-from training.predict import Prediction
+from stereoforge.pipelines.prediction import Image, Predictors
+from stereoforge.pipelines.set_evaluation import evaluate_set, evaluation_options, open_test_data
+from stereoforge.pipelines.submission import encode_disparity, find_submission_frames, write_submission
+from training.prediction.predictor import Prediction
 
 SIZE = (20, 60)
 

@@ -9,13 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import stereoforge.tuning as tuning
+import stereoforge.pipelines.parameter_search as tuning
 from datagen import DatasetError
-from datagen.source import DataSource, SourceFormat
-from refine.settings import read_settings
+from datagen.sources.registry import DataSource, SourceFormat
+from refine.evaluation.settings import read_settings
 from stereoforge.errors import CommandError
-from stereoforge.prediction import network_digests
-from stereoforge.tuning import Tuning, describe, validation_frames
+from stereoforge.pipelines.parameter_search import Tuning, describe, validation_frames
+from stereoforge.pipelines.prediction import network_digests
 from tests.refine.worlds import toy_frame
 
 

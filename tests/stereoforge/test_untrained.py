@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from datagen.formats import write_png
-from refine.methods import default_methods
+from refine.methods.registry import default_methods
 from stereoforge.cli import main
-from stereoforge.prediction import untrained, untrained_notes
+from stereoforge.pipelines.prediction import untrained, untrained_notes
 from tests.datagen.analytic_world import write_dataset
 from training.networks import DispNetConfig, DispNetCorr1D
-from training.weights import TrainingSummary, save_weights
+from training.runs.weights import TrainingSummary, save_weights
 
 
 @pytest.fixture

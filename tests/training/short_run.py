@@ -8,7 +8,7 @@ import torch
 
 from training.networks import DispNetConfig
 from training.presets import RegressorPreset, find_preset
-from training.train import train
+from training.runs.train import train
 
 VALIDATION_INTERVAL = 5  # steps; also between checkpoints
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.dataset.layout import FIRST_FRAME, Layout
+from datagen.dataset.manifest import SceneManifest, file_entry, write_manifest
 from datagen.formats import write_pfm, write_png
-from datagen.layout import FIRST_FRAME, Layout
-from datagen.manifest import SceneManifest, file_entry, write_manifest
-from training.augmentation import StereoPair
+from training.data.augmentation import StereoPair
 
 WAVES = 12
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.training.synthetic import random_layer, render
-from training.augmentation import (
+from training.data.augmentation import (
     IDENTITY_CURVE,
     NO_AUGMENTATION,
     AugmentationConfig,

@@ -13,8 +13,15 @@ from datagen import DatasetError
 from datagen.sources.webdataset import ShardFrames
 from tests.datagen.sources import published
 from tests.training.synthetic import random_pair, write_dataset
-from training.augmentation import AugmentationConfig
-from training.data import PairCache, Source, StereoDataModule, open_sources, schedule_draws, shuffle
+from training.data.augmentation import AugmentationConfig
+from training.data.pipeline import (
+    PairCache,
+    Source,
+    StereoDataModule,
+    open_sources,
+    schedule_draws,
+    shuffle,
+)
 from training.errors import TrainingError
 from training.presets import OptimizerConfig, Preset
 

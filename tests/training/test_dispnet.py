@@ -7,7 +7,7 @@ import torch
 from torch import nn
 
 from training.networks import DispNetConfig, DispNetCorr1D
-from training.networks.dispnet import LEAKY_SLOPE
+from training.networks.regressors.dispnet import LEAKY_SLOPE
 
 HEIGHT, WIDTH = 64, 128
 LINEAR, LEAKY = "none", "LReLU"

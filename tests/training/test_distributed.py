@@ -12,7 +12,7 @@ import torch
 from tests.training.short_run import run
 from tests.training.synthetic import write_dataset
 from tests.training.test_train import scalars
-from training.weights import read_summary
+from training.runs.weights import read_summary
 
 STEPS = 20
 

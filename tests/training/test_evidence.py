@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from training.networks.evidence import (
+from training.networks.cost_features import (
     COST_CEILING,
     COST_OFFSETS_PX,
     EVIDENCE_CHANNELS,

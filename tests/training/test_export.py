@@ -8,13 +8,13 @@ import pytest
 import torch
 import torch.nn.functional as F  # noqa: N812
 
-from stereoforge.shipped import SHIPPED_WEIGHTS
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from tests.training.test_predict import edit_description, save_run
 from training.errors import TrainingError
-from training.model_card import write_model_card
 from training.networks import ConfNet, Correlation1D
-from training.onnx_export import ShiftedCorrelation, export_model
-from training.predict import StereoPredictor
+from training.prediction.onnx_export import ShiftedCorrelation, export_model
+from training.prediction.predictor import StereoPredictor
+from training.runs.model_card import write_model_card
 
 
 @pytest.mark.parametrize("one_sided", [False, True])
@@ -54,7 +54,7 @@ def test_onnx_says_what_the_predictor_says(heads: bool, tmp_path: Path) -> None:
 
 def test_the_shipped_networks_can_be_exported(tmp_path: Path) -> None:
     """Their heads see more than the regressor's features."""
-    exported = export_model(SHIPPED_WEIGHTS, tmp_path)
+    exported = export_model(BUNDLED_WEIGHTS, tmp_path)
     assert exported.outputs == ("disparity", "confidence", "gradient")
 
 

@@ -9,16 +9,21 @@ import numpy as np
 import pytest
 import torch
 
-from matching import SGBMParameters, fill_background, left_right_consistency, match_both
+from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
 from tests.training.synthetic import random_layer, random_pair, render, write_dataset
-from training.augmentation import NO_AUGMENTATION
+from training.data.augmentation import NO_AUGMENTATION
 from training.errors import TrainingError
-from training.free import FREE_FEATURES, as_free_inputs, disparity_features, match_batch
 from training.metrics import optimal_auc, sparsification_auc
-from training.predict import FreePredictor
+from training.prediction.predictor import FreePredictor
+from training.prediction.regressor_free import (
+    FREE_FEATURES,
+    as_free_inputs,
+    disparity_features,
+    match_batch,
+)
 from training.presets import FreeConfNetPreset, FreeGradNetPreset, find_preset
-from training.train import train
-from training.weights import load_confnet
+from training.runs.train import train
+from training.runs.weights import load_confnet
 
 MATCHER = SGBMParameters(max_disparity_px=48)
 

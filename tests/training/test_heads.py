@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import nn
 
-from training.inference import head_inputs, regress, regress_consistently
 from training.networks import (
     ConfNet,
     DispNetConfig,
@@ -19,14 +18,15 @@ from training.networks import (
     left_right_consistency,
     predict_right,
 )
-from training.networks.dispnet import FeatureKind
-from training.networks.evidence import (
+from training.networks.cost_features import (
     COST_OFFSETS_PX,
     EVIDENCE_CHANNELS,
     SLOPE_CHANNELS,
     Evidence,
     smooth_slopes,
 )
+from training.networks.regressors.dispnet import FeatureKind
+from training.prediction.inference import head_inputs, regress, regress_consistently
 
 
 @pytest.mark.parametrize(

@@ -16,20 +16,20 @@ from torch import Tensor
 
 from datagen import StereoDataset
 from refine import MRFParameters
-from refine.baselines.ours import Ours
-from refine.confidence_shape import ConfidenceShape
+from refine.energy.confidence_shape import ConfidenceShape
+from refine.methods.ours import Ours
 from stereoforge.cli import main
 from tests.training.synthetic import write_dataset
-from training.augmentation import NO_AUGMENTATION
-from training.data import Batch
+from training.data.augmentation import NO_AUGMENTATION
+from training.data.pipeline import Batch
 from training.errors import TrainingError
-from training.inference import HeadInputs, Regression
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
-from training.predict import StereoPredictor
+from training.prediction.inference import HeadInputs, Regression
+from training.prediction.predictor import StereoPredictor
 from training.presets import JointPreset, Preset, RegressorPreset, find_preset
+from training.runs.train import train
+from training.runs.weights import read_summary
 from training.tasks import JointHeads, JointTask, StereoTask
-from training.train import train
-from training.weights import read_summary
 
 HEIGHT, WIDTH = 32, 40
 HEAD = HeadConfig(feature_channels=4, width=8, hidden=8, dropout=0.0)

@@ -11,11 +11,11 @@ import torch
 from torch import Tensor, nn
 
 from training.errors import TrainingError
-from training.inference import estimate
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, DispNetOutput, GradNet, HeadConfig
-from training.networks.evidence import Evidence
-from training.predict import StereoPredictor
-from training.weights import TrainingSummary, load_gradnet, load_regressor, read_summary, save_weights
+from training.networks.cost_features import Evidence
+from training.prediction.inference import estimate
+from training.prediction.predictor import StereoPredictor
+from training.runs.weights import TrainingSummary, load_gradnet, load_regressor, read_summary, save_weights
 
 SUMMARY = TrainingSummary(
     "custom", 10, 0, (("data", 1.0),), best_step=5, validation={"epe": 1.5},

@@ -6,7 +6,6 @@ from dataclasses import fields, is_dataclass, replace
 import pytest
 import torch
 
-from training.inference import regress
 from training.losses import STAGE_WEIGHTS
 from training.metrics import bad_rate, gradient_error, optimal_auc, sparsification_auc
 from training.networks import (
@@ -18,6 +17,7 @@ from training.networks import (
     left_right_consistency,
     predict_right,
 )
+from training.prediction.inference import regress
 from training.presets import (
     PRESETS,
     ConfNetPreset,

@@ -15,19 +15,19 @@ import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from datagen import DatasetError, StereoDataset
-from storage import alone
+from stereoforge_kit.files import alone
 from tests.datagen.sources import published
 from tests.training.synthetic import random_pair, write_dataset
-from training.augmentation import NO_AUGMENTATION
-from training.data import check_sizes
+from training.data.augmentation import NO_AUGMENTATION
+from training.data.pipeline import check_sizes
 from training.errors import TrainingError
-from training.hardware import Precision
 from training.networks import DispNetConfig
-from training.predict import StereoPredictor
+from training.prediction.predictor import StereoPredictor
 from training.presets import Preset, RegressorPreset, find_preset
+from training.runs.hardware import Precision
+from training.runs.train import train
+from training.runs.weights import read_summary
 from training.tasks import GradNetTask, StereoTask
-from training.train import train
-from training.weights import read_summary
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from training.networks.evidence import EVIDENCE_CHANNELS, Evidence
+from training.networks.cost_features import EVIDENCE_CHANNELS, Evidence
 from training.networks.heads import HeadConfig, PixelHead
 
 LRC_CEILING_PX = 20.0

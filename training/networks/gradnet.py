@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from training.networks.evidence import EVIDENCE_CHANNELS, SLOPE_CHANNELS, Evidence
+from training.networks.cost_features import EVIDENCE_CHANNELS, SLOPE_CHANNELS, Evidence
 from training.networks.heads import HeadConfig, PixelHead
 
 PUBLISHED_GRADNET = HeadConfig(dropout=0.2)

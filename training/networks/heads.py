@@ -9,7 +9,7 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
-from training.networks.dispnet import LEAKY_SLOPE, DispNetCorr1D, FeatureKind, Normalization
+from training.networks.regressors.dispnet import LEAKY_SLOPE, DispNetCorr1D, FeatureKind, Normalization
 
 Activation = Literal["relu", "leaky_relu"]
 
@@ -35,7 +35,7 @@ class HeadConfig:
     """Of the 3x3 convolutions: how far apart, in pixels, they look. Features of a regressor have seen their
     surroundings already; a disparity's own have not (ours)."""
     evidence: bool = False
-    """Also see what the pair and the disparity itself say, `training.networks.evidence` (ours)."""
+    """Also see what the pair and the disparity itself say, `training.networks.cost_features` (ours)."""
     features: FeatureKind = "joined"
     """Which features: `joined`, as the paper's words say (97 at full width), or `decoded`, which are 32."""
 

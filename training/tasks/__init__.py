@@ -1,10 +1,10 @@
 """The Lightning modules, one a task."""
 
 from training.tasks.base import StereoTask
-from training.tasks.free import FreeConfNetTask, FreeGradNetTask
 from training.tasks.heads import ConfNetTask, GradNetTask
 from training.tasks.joint import JointHeads, JointTask
 from training.tasks.regressor import FineTuningTask, RegressorTask
+from training.tasks.regressor_free import FreeConfNetTask, FreeGradNetTask
 
 __all__ = [
     "ConfNetTask",

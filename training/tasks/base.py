@@ -15,10 +15,10 @@ from torch import Tensor, nn
 from torch.nn.modules.batchnorm import _BatchNorm
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
-from training.data import Batch
+from stereoforge_kit.viewing import Picture
+from training.data.pipeline import Batch
 from training.errors import TrainingError
 from training.presets import OptimizerConfig, Preset
-from viewing import Picture
 
 STATISTICS_BATCHES = 200
 """What BatchNorm's statistics are measured over before they are fixed: by two measurements over 100 batches the

@@ -7,12 +7,12 @@ from typing import Self
 import torch
 from torch import Tensor
 
-from training.data import Batch
-from training.inference import estimate, head_inputs
+from training.data.pipeline import Batch
 from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.prediction.inference import estimate, head_inputs
 from training.presets import ConfNetPreset, GradNetPreset, Preset
 from training.tasks.base import StereoTask
-from training.tasks.learned import ConfidenceTask, GradientTask
+from training.tasks.head_objectives import ConfidenceTask, GradientTask
 
 
 class HeadTask(StereoTask):

@@ -6,10 +6,17 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
-from refine.baselines.ours import Ours
-from refine.differentiable import image_weights, refine_batch
-from training.data import Batch
-from training.inference import HeadInputs, estimate, head_inputs
+from refine.methods.ours import Ours
+from refine.mrf.torch.differentiable import image_weights, refine_batch
+from stereoforge_kit.viewing import (
+    Picture,
+    confidence_picture,
+    disparity_picture,
+    error_picture,
+    gradient_picture,
+    side_by_side,
+)
+from training.data.pipeline import Batch
 from training.losses import confidence_cross_entropy, masked_gradient_l1, refinement_l1
 from training.metrics import (
     bad_rate,
@@ -19,17 +26,10 @@ from training.metrics import (
     sparsification_auc,
 )
 from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.prediction.inference import HeadInputs, estimate, head_inputs
 from training.presets import JointPreset
 from training.tasks.base import image_of, map_of
 from training.tasks.heads import HeadTask
-from viewing import (
-    Picture,
-    confidence_picture,
-    disparity_picture,
-    error_picture,
-    gradient_picture,
-    side_by_side,
-)
 
 
 class JointHeads(nn.Module):

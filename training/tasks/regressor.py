@@ -7,14 +7,14 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor, nn
 
-from training.data import Batch
-from training.inference import estimate
+from stereoforge_kit.viewing import Picture, disparity_picture, error_picture, side_by_side
+from training.data.pipeline import Batch
 from training.losses import gradient_aware_l1, multiscale_l1, stage_weights
 from training.metrics import bad_rate, end_point_error, forward_differences, gradient_error
 from training.networks import DispNetCorr1D, full_resolution
+from training.prediction.inference import estimate
 from training.presets import FineTuningPreset, RegressorPreset
 from training.tasks.base import StereoTask, image_of, map_of
-from viewing import Picture, disparity_picture, error_picture, side_by_side
 
 SMOOTH_BELOW_PX = 1.0
 """Gradient errors are reported where the true forward differences stay below this."""

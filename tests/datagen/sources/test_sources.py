@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from datagen import DatasetError
-from datagen.derived import derive_occlusion
-from datagen.shards import CACHE_VARIABLE
-from datagen.source import DataSource, open_source, source_formats
+from datagen.dataset.shards import CACHE_VARIABLE
+from datagen.ground_truth.from_disparity import derive_occlusion
+from datagen.sources.registry import DataSource, open_source, source_formats
 from tests.datagen.sources import published
 from tests.datagen.sources.published import World, png, shard, shard_members, world
 

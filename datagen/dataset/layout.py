@@ -1,0 +1,168 @@
+"""Where everything of a data set lies: the FlyingThings3D tree, and more beside it.
+
+    recipe.yaml
+    frames_cleanpass/TRAIN/A/0003/left/0006.png     one file an eye and frame
+    camera_data/TRAIN/A/0003/camera_data.txt        one file a scene
+    scenes/TRAIN/A/0003.json                        the Scene record
+    manifest/TRAIN/A/0003.json                      written last: a scene is there if its manifest is
+
+Frames are numbered from `FIRST_FRAME`, as in FlyingThings3D; that file shows the scene at the instant t = 0.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from datagen.errors import DatasetError
+from stereoforge_kit.files import LocalTree, Tree
+
+SPLITS = ("train", "val", "test")
+Eye = Literal["left", "right"]
+EYES: tuple[Eye, Eye] = ("left", "right")
+Direction = Literal["into_future", "into_past"]
+DIRECTIONS: tuple[Direction, Direction] = ("into_future", "into_past")
+"""To the instant one frame later, and one frame earlier."""
+
+FIRST_FRAME = 6
+LETTER = "A"
+"""FlyingThings3D groups its scenes in A, B and C; all of ours are in the first group."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of data file: the top folder that holds it and how its files are called."""
+
+    folder: str
+    extension: str
+    per_eye: bool = True
+    """One file an eye and frame; otherwise one file a scene, named after the kind."""
+    over_time: bool = False
+    """One file a direction, eye and frame."""
+
+    @property
+    def directions(self) -> tuple[Direction | None, ...]:
+        """What `Layout.file` takes as the direction of this kind."""
+        return DIRECTIONS if self.over_time else (None,)
+
+
+KINDS = {
+    kind.folder: kind
+    for kind in (
+        Kind("frames_cleanpass", ".png"),
+        Kind("frames_finalpass", ".png"),
+        Kind("disparity", ".pfm"),
+        Kind("disparity_gradient", ".exr"),
+        Kind("occlusion", ".png"),
+        Kind("object_index", ".png"),
+        Kind("material_index", ".png"),
+        Kind("normals", ".exr"),
+        Kind("optical_flow", ".pfm", over_time=True),
+        Kind("disparity_change", ".pfm", over_time=True),
+        Kind("motion_boundaries", ".pgm", over_time=True),
+        Kind("camera_data", ".txt", per_eye=False),
+    )
+}
+"""Every kind of data file by its name, which is also its folder's."""
+TARGETS = ("disparity", "disparity_gradient", "occlusion", "object_index", "camera_data")
+"""The kinds every scene has, whichever passes were rendered."""
+EXTRA_TARGETS = ("material_index", "normals", "optical_flow", "disparity_change", "motion_boundaries")
+"""The kinds a recipe may ask for besides."""
+RENDER_PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
+
+_RECORD_NAME = re.compile(r"(\d{4}|[1-9]\d{4,})\.json")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The paths of a data set under its root folder; only `local` and `committed_scenes` touch the disk."""
+
+    root: Path
+
+    def scene_folder(self, kind: str, split: str, scene: int) -> Path:
+        """The folder of one kind of file of one scene, for example root/disparity/TRAIN/A/0003."""
+        return self._group(KINDS[kind].folder, split) / _number(scene)
+
+    def file(
+        self,
+        kind: str,
+        split: str,
+        scene: int,
+        eye: str | None = None,
+        frame: int | None = None,
+        direction: Direction | None = None,
+    ) -> Path:
+        """A data file. Kinds with files an eye need `eye` and the frame's number (`FIRST_FRAME` + t), those
+        over time a direction as well."""
+        entry, folder = KINDS[kind], self.scene_folder(kind, split, scene)
+        if not entry.per_eye:
+            return folder / f"{entry.folder}{entry.extension}"
+        if eye not in EYES or frame is None or frame < FIRST_FRAME:
+            raise ValueError(
+                f"a file of {kind} needs an eye, left or right, and a frame from {FIRST_FRAME} up, "
+                f"got {eye!r} and {frame}"
+            )
+        if direction not in entry.directions:
+            raise ValueError(f"a file of {kind} has no direction {direction!r}")
+        name = _number(frame)
+        if kind == "optical_flow":
+            towards = "IntoFuture" if direction == "into_future" else "IntoPast"
+            name = f"OpticalFlow{towards}_{name}_{eye[0].upper()}"
+        return folder / (direction or "") / eye / f"{name}{entry.extension}"
+
+    def scene_record(self, split: str, scene: int) -> Path:
+        return self._group("scenes", split) / f"{_number(scene)}.json"
+
+    def manifest(self, split: str, scene: int) -> Path:
+        return self._group("manifest", split) / f"{_number(scene)}.json"
+
+    def scene_paths(self, split: str, scene: int) -> list[Path]:
+        """All that a scene consists of, its folders first and its manifest last."""
+        folders = [self.scene_folder(kind, split, scene) for kind in KINDS]
+        return [*folders, self.scene_record(split, scene), self.manifest(split, scene)]
+
+    @property
+    def assets(self) -> Path:
+        """The folder of the user's own files, prepared (`datagen.recipe.assets`)."""
+        return self.root / "assets"
+
+    @property
+    def recipe(self) -> Path:
+        return self.root / "recipe.yaml"
+
+    @property
+    def tree(self) -> Tree:
+        """Where the files are."""
+        return LocalTree(self.root)
+
+    def local(self, path: Path) -> Path:
+        """Make sure that a path of this layout can be read, if there is such a file; return it."""
+        return path
+
+    def committed_scenes(self, split: str) -> list[int]:
+        """The numbers of the scenes that are whole, ascending: those that have a manifest."""
+        return scene_numbers(self.tree.files_in(self.relative(self._group("manifest", split))))
+
+    def relative(self, path: Path) -> str:
+        """A path under the root as the manifest writes it: relative, with forward slashes."""
+        return path.relative_to(self.root).as_posix()
+
+    def _group(self, folder: str, split: str) -> Path:
+        if split not in SPLITS:
+            raise DatasetError(f"{self.root}: there is no split {split!r}; there are {', '.join(SPLITS)}")
+        return self.root / folder / split.upper() / LETTER
+
+
+def scene_numbers(names: Iterable[str]) -> list[int]:
+    """The scenes whose records or manifests have these file names, ascending; other names are left out."""
+    matches = (_RECORD_NAME.fullmatch(name) for name in names)
+    return sorted(int(match[1]) for match in matches if match)
+
+
+def _number(value: int) -> str:
+    if value < 0:
+        raise ValueError(f"scenes and frames are numbered from 0, got {value}")
+    return f"{value:04d}"

@@ -1,0 +1,98 @@
+"""Which scenes are no use for training: found out before they are rendered, as far as rays can tell.
+
+A rejected scene is drawn again from another random stream, that of its next attempt, so a data set with
+rejections is as reproducible as one without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.dataset.statistics import textured_share
+from datagen.errors import DatasetError
+from datagen.ground_truth.labels import VISIBLE
+from datagen.ground_truth.raycast import SceneRayCaster
+
+TEXTURELESS = "textureless"
+RAYS_ACROSS = 48
+"""Columns of the coarse grid of pixels that are looked at; rows in proportion."""
+
+
+@dataclass(frozen=True)
+class Curation:
+    """When a frame is degenerate. Shares are of the left eye's pixels, 0..1."""
+
+    enabled: bool = True
+    """Whether anything is rejected."""
+    attempts: int = 20
+    """How often a scene is drawn before giving up."""
+    max_inside: float = 0.3
+    """Seeing the inner side of one object on more than this means that the camera is inside it."""
+    max_one_object: float = 0.9
+    """One object, or the sky, filling more than this leaves nothing to learn."""
+    max_hidden: float = 0.7
+    """Share that the other eye cannot see."""
+    min_textured: float = 0.05
+    """Share with texture around it, of the rendered picture."""
+    disparity_px: tuple[float, float] | None = None
+    """Least and greatest disparity asked for of surfaces, met by choosing depths and baseline; None for whatever
+    the family gives."""
+    max_outside: float = 0.02
+    """Share of surfaces whose disparity may be outside of that."""
+
+    def __post_init__(self) -> None:
+        if self.attempts < 1:
+            raise DatasetError(f"curation attempts must be at least 1, got {self.attempts}")
+        for name in ("max_inside", "max_one_object", "max_hidden", "min_textured", "max_outside"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise DatasetError(f"curation {name} must be in 0..1, got {getattr(self, name):g}")
+        if self.disparity_px and not 0 <= self.disparity_px[0] < self.disparity_px[1]:
+            raise DatasetError(
+                f"curation disparity_px must be (least, greatest), got {tuple(self.disparity_px)}"
+            )
+
+
+def fault_before_rendering(caster: SceneRayCaster, curation: Curation) -> str | None:
+    """What is wrong with the scene's first or last frame, in a word or two; None if nothing is."""
+    if not curation.enabled:
+        return None
+    # The first frame last: it is the one that the caster will be asked for next.
+    for frame in sorted({0, caster.geometry.scene.frames - 1}, reverse=True):
+        for fault in _faults(caster, curation, frame):
+            return fault
+    return None
+
+
+def share_outside(surfaces: NDArray[np.floating[Any]], curation: Curation) -> float:
+    """Share of the surfaces' disparities (P,) outside the range asked for; 0 without surfaces or without a range."""
+    if not curation.disparity_px or not len(surfaces):
+        return 0.0
+    low, high = curation.disparity_px
+    return float(((surfaces < low) | (surfaces > high)).mean())
+
+
+def is_textureless(image: NDArray[np.uint8], curation: Curation) -> bool:
+    """Whether nearly all of a rendered (H, W, 3) picture has nothing to match."""
+    return curation.enabled and textured_share(image) < curation.min_textured
+
+
+def _faults(caster: SceneRayCaster, curation: Curation, frame: int) -> Iterator[str]:
+    scene = caster.geometry.scene
+    rows, columns = caster.coarse_pixels(RAYS_ACROSS)
+    hits = caster.cast("left", frame, rows, columns)
+    counts = np.bincount(hits.object_index, minlength=len(scene.objects) + 1) / len(rows)
+    from_behind = caster.sees_back(frame, rows, columns)
+    inner = np.bincount(hits.object_index[from_behind], minlength=len(counts)) / len(rows)
+    if inner.max() > curation.max_inside:
+        yield "camera inside an object"
+    if counts.max() > curation.max_one_object:
+        yield "one surface fills the view"
+    if (hits.occlusion != VISIBLE).mean() > curation.max_hidden:
+        yield "mostly hidden from the other eye"
+    if share_outside(hits.disparity[hits.object_index > 0], curation) > curation.max_outside:
+        yield "disparity out of range"

@@ -1,0 +1,129 @@
+"""Meeting a histogram of disparities: each scene's depths and baseline drawn such that the set as a whole has it.
+
+What one scene shows is spread about its median in a way of its own, and the baseline puts that median wherever it is
+wanted without changing what the left eye sees. So a set's histogram is a mixture of the family's spread at different
+medians; families that place things by disparity have several spreads, narrow and wide. A few scenes that belong to no
+split show those spreads once, when the recipe is made; the shares of the mixture nearest to the histogram are written
+into the recipe, and every scene takes its turn by its number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from datagen.errors import DatasetError
+from datagen.recipe.disparity_range import surface_disparities
+from scenes import FAMILIES, FamilyConfig, sample_scene
+
+PILOT_KEY = 3
+"""First number of the pilot scenes' random streams, beside those of the three splits."""
+PILOT_SCENES = 16
+"""Of each spread."""
+NARROW_RANGES = (4.0, 20.0)
+"""Ratios of greatest and least disparity that families which place things by disparity try besides their own."""
+MEDIANS = 40
+"""Candidates, evenly spaced in the logarithm over three times the histogram's extent."""
+NEGLIGIBLE = 1e-3
+"""Components with less than this share are left out."""
+_GOLDEN = (np.sqrt(5) - 1) / 2
+
+
+@dataclass(frozen=True)
+class Component:
+    """Some of a set's scenes."""
+
+    share: float
+    """Of the scenes."""
+    median_px: float
+    """Where the baseline puts the median of the surfaces' disparities."""
+    ratio: float | None = None
+    """Greatest over least disparity, for families that choose depths; None for the family's own."""
+
+
+@dataclass(frozen=True)
+class DisparityHistogram:
+    """How many pixels of surfaces shall have which disparity, over the left views of all scenes together."""
+
+    edges_px: tuple[float, ...]
+    """Bounds of the bins, increasing."""
+    shares: tuple[float, ...]
+    """Of each bin; they add up to 1."""
+    components: tuple[Component, ...] = ()
+    """What meets it, found by `fitted`."""
+
+    def __post_init__(self) -> None:
+        if len(self.edges_px) != len(self.shares) + 1 or not self.shares:
+            raise DatasetError("a disparity histogram needs one more edge than shares")
+        if self.edges_px[0] < 0 or any(b <= a for a, b in pairwise(self.edges_px)):
+            raise DatasetError(
+                f"the edges of a disparity histogram must increase from 0, got {self.edges_px}"
+            )
+        if min(self.shares) < 0 or abs(sum(self.shares) - 1) > 1e-6:
+            raise DatasetError(f"the shares of a disparity histogram must add up to 1, got {self.shares}")
+
+    def component(self, scene: int) -> Component:
+        """That of the scene-th scene of a split: any run of scenes holds each about as often as its share says."""
+        turn = (scene + 0.5) * _GOLDEN % 1.0
+        bounds = np.cumsum([component.share for component in self.components])
+        return self.components[min(int(np.searchsorted(bounds, turn * bounds[-1])), len(bounds) - 1)]
+
+    def missed(self, disparity: NDArray[np.floating[Any]]) -> float:
+        """Share of the surfaces' pixels (above 0) that would have to change bins to meet it."""
+        surfaces = disparity[disparity > 0]
+        found = np.histogram(surfaces, self.edges_px)[0] / max(len(surfaces), 1)
+        return float(np.maximum(np.array(self.shares) - found, 0).sum())
+
+
+def with_depths(world: FamilyConfig, component: Component) -> FamilyConfig:
+    """The family's config with the spread of depths that a component asks for."""
+    return world if component.ratio is None else world.within_disparities(1.0, component.ratio)
+
+
+def fitted(wanted: DisparityHistogram, world: FamilyConfig, seed: int) -> DisparityHistogram:
+    """The histogram with the components that come nearest to it for a family's worlds.
+
+    Least squares between the cumulative distributions at the edges, over mixtures (non-negative shares that add up to
+    1). Samples and ray-casts some scenes: seconds.
+    """
+    family = next(name for name, kind in FAMILIES.items() if type(world) is kind.config)
+    ratios = (None, *NARROW_RANGES) if world.depths_for_range else (None,)
+    lowest = max(wanted.edges_px[0], wanted.edges_px[1] / 8)
+    medians = np.geomspace(lowest / 1.5, wanted.edges_px[-1] * 1.5, MEDIANS)
+    candidates = [Component(1.0, float(f"{px:.4g}"), ratio) for ratio in ratios for px in medians]
+    spreads = {
+        ratio: _spread(with_depths(world, Component(1.0, 1.0, ratio)), family, seed) for ratio in ratios
+    }
+    columns = [
+        np.searchsorted(spreads[one.ratio], np.array(wanted.edges_px) / one.median_px)
+        / len(spreads[one.ratio])
+        for one in candidates
+    ]
+    goal = np.concatenate([[0.0], np.cumsum(wanted.shares)])
+    # Shares that do not add up to 1 cost far more than any misfit.
+    system = np.vstack([np.stack(columns, axis=1), np.full(len(candidates), 100.0)])
+    weights, _ = nnls(system, np.append(goal, 100.0))
+    kept = [
+        replace(one, share=float(f"{weight:.4g}"))
+        for one, weight in zip(candidates, weights, strict=True)
+        if weight > NEGLIGIBLE
+    ]
+    kept.sort(key=lambda one: one.median_px)
+    return replace(wanted, components=tuple(kept))
+
+
+def _spread(world: FamilyConfig, family: str, seed: int) -> NDArray[np.float64]:
+    """Disparities of the pilot scenes' surfaces over their scene's median, sorted, each scene counting alike."""
+    pooled = []
+    for number in range(PILOT_SCENES):
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PILOT_KEY, number)))
+        disparity = surface_disparities(sample_scene(rng, family, world))
+        if len(disparity):
+            quantiles = np.quantile(disparity, np.linspace(0.0005, 0.9995, 1000))
+            pooled.append(quantiles / np.median(disparity))
+    return np.sort(np.concatenate(pooled))

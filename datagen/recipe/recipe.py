@@ -1,0 +1,222 @@
+"""The recipe of a data set: all that decides its bytes, as a typed record and as `recipe.yaml`."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from datagen.dataset.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
+from datagen.errors import DatasetError
+from datagen.formats.limits import MAX_ELEMENTS, read_bounded
+from datagen.recipe.curation import Curation
+from datagen.recipe.disparity_histogram import DisparityHistogram, fitted, with_depths
+from datagen.recipe.disparity_range import REACHED_PERCENT, with_disparity_at
+from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
+from scenes.serialization import OMIT_DEFAULT, from_plain, to_plain
+from scenes.user_assets.pool import AssetPool
+from stereoforge_kit.files import write_text
+
+MAX_RECIPE_BYTES = 1 << 20
+MAX_RECIPE_DEPTH = 32
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What to render. Two runs of one recipe give the same bytes, however the work is spread."""
+
+    world: FamilyConfig
+    """The family's own config; the image size and the frames a scene are in it."""
+    scenes: dict[str, int]
+    """How many scenes each split has."""
+    seed: int = 0
+    samples: int = 4
+    """Paths a pixel for the pictures; ground truth is exact whatever this is."""
+    passes: tuple[str, ...] = ("clean",)
+    targets: tuple[str, ...] = ()
+    """Targets besides disparity, gradient, occlusion and object index, which are always made."""
+    gradient_threshold_px: float = 1.0
+    """Jumps above this are discontinuities, masked out of the gradient targets."""
+
+    assets: AssetPool = field(default_factory=AssetPool)
+    """The user's own files; each belongs to one split only."""
+    curriculum_scenes: int = 0
+    """Over so many scenes of the train split the worlds grow from few and simple to the family's own; 0 for none. What
+    is validated and tested on is the family's own from the first scene."""
+    curation: Curation = field(default_factory=Curation)
+    disparities: DisparityHistogram | None = field(default=None, metadata=OMIT_DEFAULT)
+    """How the disparities of all scenes together shall be spread; None for whatever the family gives."""
+
+    def __post_init__(self) -> None:
+        for split, count in self.scenes.items():
+            if split not in SPLITS:
+                raise DatasetError(f"there is no split {split!r}; there are {', '.join(SPLITS)}")
+            if count < 0:
+                raise DatasetError(f"the number of {split} scenes must not be negative, got {count}")
+        if not self.passes:
+            raise DatasetError(f"passes must be among {', '.join(RENDER_PASSES)}, got none")
+        _check_names("passes", self.passes, RENDER_PASSES)
+        _check_names("targets", self.targets, EXTRA_TARGETS)
+        at_least_one = {
+            "samples": self.samples,
+            "width": self.world.width,
+            "height": self.world.height,
+            "frames per scene": self.world.frames,
+        }
+        for name, value in at_least_one.items():
+            if value < 1:
+                raise DatasetError(f"{name} must be at least 1, got {value}")
+        self._check_size()
+        if not 0 < self.gradient_threshold_px < math.inf:
+            raise DatasetError(f"gradient_threshold_px must be above 0, got {self.gradient_threshold_px:g}")
+        if self.curriculum_scenes < 0:
+            raise DatasetError(f"curriculum_scenes must not be negative, got {self.curriculum_scenes}")
+        if self.assets and not FAMILIES[self.family].takes_assets:
+            raise DatasetError(f"worlds of {self.family} take no meshes, textures or environments of yours")
+        try:
+            self.world.at_complexity(0.0 if self.curriculum_scenes else 1.0)
+            if self.curation.disparity_px:
+                self.world.within_disparities(*self.curation.disparity_px)
+        except ValueError as error:
+            raise DatasetError(str(error)) from error
+        if self.disparities and self.curation.disparity_px:
+            raise DatasetError("a recipe has a range of disparities or a histogram of them, not both")
+        if self.disparities and not self.disparities.components:
+            object.__setattr__(self, "disparities", fitted(self.disparities, self.world, self.seed))
+        if self.seed < 0:
+            raise DatasetError(f"the seed must not be negative, got {self.seed}")
+
+    def _check_size(self) -> None:
+        """Raise DatasetError for images that no reader would take, and disparities that no eye would see."""
+        width, height = self.world.width, self.world.height
+        if 3 * width * height > MAX_ELEMENTS:
+            raise DatasetError(
+                f"images of {width}x{height} are too large: files of a data set hold {MAX_ELEMENTS // 3} pixels"
+            )
+        ranges = (self.curation.disparity_px, self.disparities and self.disparities.edges_px)
+        greatest = max((limits[-1] for limits in ranges if limits), default=0.0)
+        if greatest > width:
+            raise DatasetError(
+                f"a disparity of {greatest:g} px is never seen in images that are {width} px wide"
+            )
+
+    @property
+    def family(self) -> str:
+        return next(name for name, family in FAMILIES.items() if type(self.world) is family.config)
+
+    def settings_sha256(self) -> str:
+        """Identifies everything but the numbers of scenes, which may grow."""
+        settings = to_plain(replace(self, scenes={}))
+        return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
+
+    def sample(self, split: str, index: int, attempt: int = 0) -> Scene:
+        """The index-th scene of a split; splits, scenes and attempts draw from unrelated random streams."""
+        key = (SPLITS.index(split), index) + ((attempt,) if attempt else ())
+        sequence = np.random.SeedSequence(self.seed, spawn_key=key)
+        world = self.world
+        if split == "train" and index < self.curriculum_scenes:
+            world = world.at_complexity(index / self.curriculum_scenes)
+        wanted = self.curation.disparity_px
+        world = world.within_disparities(*wanted) if wanted else world
+        component = self.disparities.component(index) if self.disparities else None
+        world = with_depths(world, component) if component else world
+        scene = sample_scene(np.random.default_rng(sequence), self.family, world, self.assets.of_split(split))
+        if wanted and not world.depths_for_range:
+            scene = with_disparity_at(scene, REACHED_PERCENT, wanted[1])
+        return with_disparity_at(scene, 50.0, component.median_px) if component else scene
+
+
+def _check_names(what: str, names: tuple[str, ...], known: Collection[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise DatasetError(f"{what} must be among {', '.join(known)}, got {name!r}")
+        if names.count(name) > 1:
+            raise DatasetError(f"{what} name {name!r} {names.count(name)} times")
+
+
+def recipe_from_plain(data: Any, origin: str) -> Recipe:
+    """Raises DatasetError naming `origin` for anything that is not a recipe."""
+    if not isinstance(data, dict):
+        raise DatasetError(f"{origin} is not a valid recipe: it has no settings, such as world: and scenes:")
+    try:
+        return from_plain(data, Recipe)
+    except (ValueError, RecursionError) as error:
+        raise DatasetError(f"{origin} is not a valid recipe: {error}") from error
+
+
+def recipe_from_text(text: bytes, origin: str) -> Recipe:
+    """Raises DatasetError naming `origin` for bytes that are no YAML, or no recipe."""
+    if len(text) > MAX_RECIPE_BYTES:
+        raise DatasetError(f"cannot read the recipe {origin}: {len(text)} bytes are more than any recipe has")
+    try:
+        _check_shape(text.decode("utf-8"))
+        data = yaml.safe_load(text.decode("utf-8"))
+    except (UnicodeDecodeError, yaml.YAMLError, RecursionError, ValueError) as error:
+        raise DatasetError(f"cannot read the recipe {origin}: {_reason(error)}") from error
+    return recipe_from_plain(data, origin)
+
+
+def _reason(error: Exception) -> str:
+    """What is wrong with a text, and in which line, without the parser's account of what it was about to do."""
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem and error.problem_mark:
+        return f"line {error.problem_mark.line + 1}: {error.problem}"
+    return " ".join(str(error).split())
+
+
+def _check_shape(text: str) -> None:
+    """Raise ValueError for nesting and repetition by reference that no recipe has and that could grow without end."""
+    depth = 0
+    for event in yaml.parse(text, yaml.SafeLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if isinstance(event, yaml.AliasEvent) or depth > MAX_RECIPE_DEPTH:
+            raise ValueError("it refers to another place in it or is nested too deeply")
+
+
+def read_recipe(path: Path) -> Recipe:
+    """Raises DatasetError for a file that is missing, no YAML, or no recipe."""
+    if not path.exists():
+        raise DatasetError(f"there is no recipe {path}")
+    return recipe_from_text(read_bounded(path, MAX_RECIPE_BYTES), str(path))
+
+
+def recipe_to_text(recipe: Recipe) -> str:
+    return yaml.safe_dump(to_plain(recipe), sort_keys=False)
+
+
+def write_recipe(path: Path, recipe: Recipe) -> None:
+    write_text(path, recipe_to_text(recipe))
+
+
+def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
+    """The recipe of a folder that already has one: scenes may be added, nothing else may change.
+
+    Raises DatasetError naming the first setting that differs.
+    """
+    before, after = (_flat(to_plain(replace(recipe, scenes={}))) for recipe in (existing, wanted))
+    # Another family has other settings altogether; that it is another one is what to say.
+    for key in sorted(set(before) | set(after), key=lambda key: (key != "world.family", key)):
+        if before.get(key) != after.get(key):
+            raise DatasetError(
+                f"{folder} was rendered with {key} {before.get(key)}, not {after.get(key)}: "
+                "use the same settings to finish or extend it, or another folder"
+            )
+    splits = [split for split in SPLITS if split in existing.scenes or split in wanted.scenes]
+    counts = {split: max(existing.scenes.get(split, 0), wanted.scenes.get(split, 0)) for split in splits}
+    return replace(existing, scenes=counts)
+
+
+def _flat(data: Any, prefix: str = "") -> dict[str, Any]:
+    if not isinstance(data, dict):
+        return {prefix: data}
+    return {
+        name: value
+        for key, item in data.items()
+        for name, value in _flat(item, f"{prefix}.{key}" if prefix else key).items()
+    }

@@ -1,0 +1,1 @@
+"""From a recipe to scenes on disk: frames, passes, staging, quarantine, resumption."""

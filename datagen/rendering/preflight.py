@@ -1,0 +1,64 @@
+"""Looking before rendering: can what a recipe asks for be had at all, on this machine and of this family?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from datagen.errors import DatasetError
+from datagen.recipe.curation import share_outside
+from datagen.recipe.disparity_range import surface_disparities
+from datagen.recipe.recipe import Recipe
+from scenes.user_assets.pool import AssetPool
+from stereoforge_kit.processes import WorkerError, call_limited
+
+DEVICE_TIMEOUT_S = 300.0
+"""A driver that is met for the first time may compile for a while."""
+
+
+def check_device(device: str) -> None:
+    """Raise DatasetError unless Cycles finds such a device on this machine, asked in a process of its own: drivers
+    crash."""
+    if device == "cpu":
+        return
+    try:
+        found = call_limited(_finds, (device,), memory_bytes=None, timeout_s=DEVICE_TIMEOUT_S)
+    except WorkerError as error:
+        raise DatasetError(f"Blender could not be asked for {device} devices: {error}") from error
+    if not found:
+        raise DatasetError(
+            f"Blender finds no {device} device on this machine; render on the cpu, or elsewhere"
+        )
+
+
+def check_disparity_range(recipe: Recipe) -> None:
+    """Raise DatasetError if no scene of as many as would be drawn for one keeps within the recipe's disparities.
+
+    Samples and ray-casts scenes until one does: seconds.
+    """
+    curation = recipe.curation
+    if not curation.enabled or not curation.disparity_px:
+        return
+    plain = replace(recipe, curriculum_scenes=0, assets=AssetPool())
+    least, spread = 1.0, (0.0, 0.0)
+    for attempt in range(curation.attempts):
+        surfaces = surface_disparities(plain.sample("train", 0, attempt))
+        share = share_outside(surfaces, curation)
+        if share <= curation.max_outside:
+            return
+        if share <= least:
+            least, spread = share, tuple(np.percentile(surfaces, (1, 99)))
+    low, high = curation.disparity_px
+    raise DatasetError(
+        f"worlds of {recipe.family} do not keep within disparities of {low:g} to {high:g} px at {recipe.world.width}x"
+        f"{recipe.world.height}: of {curation.attempts} drawn, the best has {least:.0%} of its surfaces outside, where "
+        f"{curation.max_outside:.0%} may be, and spans {spread[0]:.0f} to {spread[1]:.0f} px; ask for a wider range"
+    )
+
+
+def _finds(device: str) -> bool:
+    """Runs in a process of its own, where Blender may be loaded."""
+    from datagen.blender.session import finds_device
+
+    return finds_device(device)

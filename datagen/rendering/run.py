@@ -1,0 +1,277 @@
+"""Rendering a data set: which scenes are missing, workers to make them, and what came of it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from datagen.dataset.layout import SPLITS, Layout, scene_numbers
+from datagen.dataset.manifest import SceneManifest
+from datagen.errors import DatasetError, DiskFullError
+from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
+from datagen.executors.devices import assign_devices, find_gpus
+from datagen.recipe.recipe import Recipe, merge_into, recipe_from_text, write_recipe
+from datagen.rendering.preflight import check_device, check_disparity_range
+from datagen.rendering.quarantine import (
+    QuarantinedScene,
+    put_in_quarantine,
+    quarantined_scenes,
+    read_quarantined,
+    release,
+)
+from datagen.rendering.run_log import RunLog, run_log
+from datagen.rendering.scene_job import SceneJob, render_scene
+from datagen.rendering.staging import STAGING_FOLDER, StagingArea, discard_uncommitted, staging_area
+from stereoforge_kit.files import LocalTree, Tree, open_tree
+from stereoforge_kit.processes import Limits, available_memory_bytes
+
+SCENE_TIMEOUT_S = 1800.0
+MEMORY_SHARE = 0.8
+"""Of the machine's memory, for all workers together."""
+NO_ROOM_BYTES = 16 << 20
+"""A failure with less room than this is the disk's: Blender does not say so itself."""
+
+Scene = tuple[str, int]
+"""(split, number)."""
+
+
+@dataclass(frozen=True)
+class RenderSummary:
+    """What a run of `render_dataset` did."""
+
+    recipe: Recipe
+    """The folder's recipe after the run."""
+    rendered: int
+    already_there: int
+    failures: tuple[QuarantinedScene, ...]
+    """Every scene asked for that is in quarantine now, from this run or an earlier one."""
+
+
+def render_dataset(
+    recipe: Recipe,
+    root: Path | str,
+    *,
+    workers: int | None = None,
+    device: str = "cpu",
+    shard: tuple[int, int] = (0, 1),
+    executor: Executor | None = None,
+    only: Collection[Scene] | None = None,
+    on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
+) -> RenderSummary:
+    """Render what is missing of a recipe under `root`; running it again finishes or extends the data set.
+
+    A scene that crashes, hangs, exceeds its memory or raises an error goes to quarantine with its record and
+    log, the others go on; later runs leave it alone unless it is named in `only`.
+
+    root: a folder, or a URL that fsspec knows, such as s3://bucket/folder. workers: processes, default one a
+    core or one a GPU. shard: (i, n) renders only every n-th scene from the i-th, so that n machines can share
+    a folder. only: render these (split, number) if they are missing, and nothing else. on_scene: called with
+    (done, total, manifest or None if it failed).
+
+    Raises DatasetError if the folder holds something else: other files, or a data set of other settings; before
+    anything is written if this machine has no such device, or scenes cannot have the disparities asked for; and
+    DiskFullError, with the data set as whole as it is, when there is no room for more.
+    """
+    tree = open_tree(root)
+    if isinstance(tree, LocalTree) and tree.root.exists() and not tree.root.is_dir():
+        raise DatasetError(f"{tree.name} is a file, not a folder; give a new or empty folder")
+    wanted = list(_wanted(recipe, shard))
+    merged = _merge(tree, recipe)
+    if wanted:
+        _check_store(tree, recipe)
+    executor = executor or local_executor(workers, device)
+    _check_possible(recipe, device, executor, tree, wanted)
+    with staging_area(tree) as area, run_log(tree, area.folder) as log:
+        _write_recipe(tree, area, merged)
+        quarantined = set(quarantined_scenes(tree))
+        present = committed_scenes(tree)
+        chosen = set(wanted) - quarantined if only is None else set(only)
+        missing = [scene for scene in wanted if scene in chosen and scene not in present]
+        jobs = [SceneJob(tree, area, recipe, *scene, device, executor.threads) for scene in missing]
+        run = _Run(tree, area, recipe, log, quarantined, len(jobs), on_scene)
+        run.go(executor, jobs)
+    asked = run.quarantined if only is None else run.quarantined & set(only)
+    failures = tuple(read_quarantined(tree, *scene) for scene in wanted if scene in asked)
+    already_there = sum(scene in present for scene in wanted)
+    return RenderSummary(replace(merged, scenes=recipe.scenes), run.rendered, already_there, failures)
+
+
+def local_executor(
+    workers: int | None = None,
+    device: str = "cpu",
+    timeout_s: float = SCENE_TIMEOUT_S,
+    memory_bytes: int | None = None,
+) -> LocalExecutor:
+    """Worker processes of this machine: one a core or one a GPU, which together fit into its memory.
+
+    timeout_s, memory_bytes: what one scene may use, and the memory by default its worker's share.
+    """
+    cores = len(os.sched_getaffinity(0))
+    gpus = find_gpus(device, os.environ)
+    environments = assign_devices(device, gpus, workers if gpus else workers or cores)
+    share = int(MEMORY_SHARE * available_memory_bytes() / len(environments))
+    return LocalExecutor(environments, WorkerPolicy(Limits(timeout_s, memory_bytes or share)))
+
+
+def ray_executor(
+    address: str | None = None,
+    workers: int | None = None,
+    device: str = "cpu",
+    timeout_s: float = SCENE_TIMEOUT_S,
+    memory_bytes: int | None = None,
+) -> RayExecutor:
+    """Workers of a Ray cluster: one a CPU, or one a GPU.
+
+    memory_bytes: what one scene may use; no limit by default, since the machines of a cluster differ.
+    """
+    policy = WorkerPolicy(Limits(timeout_s, memory_bytes))
+    return RayExecutor(address, workers, gpus_per_job=0.0 if device == "cpu" else 1.0, policy=policy)
+
+
+@dataclass
+class _Run:
+    """The outcomes of a run as they come: counted, logged, quarantined."""
+
+    tree: Tree
+    area: StagingArea
+    recipe: Recipe
+    log: RunLog
+    quarantined: set[Scene]
+    total: int
+    on_scene: Callable[[int, int, SceneManifest | None], None] | None
+    rendered: int = 0
+    bytes_written: int = 0
+    in_flight: set[Scene] = field(default_factory=set)
+
+    def go(self, executor: Executor, jobs: list[SceneJob]) -> None:
+        settings = self.recipe.settings_sha256()
+        self.log.write("run_started", scenes=self.total, executor=repr(executor), recipe_sha256=settings)
+        try:
+            with closing(executor.run(render_scene, self._handed_out(jobs))) as outcomes:
+                for done, outcome in enumerate(outcomes, start=1):
+                    self._take(outcome)
+                    if self.on_scene:
+                        self.on_scene(done, self.total, outcome.result)
+        except BaseException as error:
+            self.log.write("run_stopped", rendered=self.rendered, why=f"{type(error).__name__}: {error}")
+            raise
+        finally:
+            for scene in self.in_flight:
+                discard_uncommitted(self.tree, *scene)
+        self.log.write("run_finished", rendered=self.rendered, failed=self.total - self.rendered)
+
+    def _handed_out(self, jobs: Iterable[SceneJob]) -> Iterator[SceneJob]:
+        for job in jobs:
+            self.in_flight.add((job.split, job.scene))
+            yield job
+
+    def _take(self, outcome: Outcome[SceneJob, SceneManifest]) -> None:
+        scene = (outcome.job.split, outcome.job.scene)
+        if outcome.result is not None:
+            self.in_flight.remove(scene)
+            self._take_scene(scene, outcome.result, outcome.attempts)
+            return
+        assert outcome.failure is not None
+        failure = outcome.failure
+        self.log.write(
+            "scene_failed",
+            scene=outcome.job.name,
+            kind=failure.kind,
+            reason=failure.sentence,
+            attempts=outcome.attempts,
+        )
+        if failure.kind == "disk_full" or self._no_room_left():
+            raise DiskFullError(self._disk_full_sentence())
+        self.in_flight.remove(scene)
+        discard_uncommitted(self.tree, *scene)
+        put_in_quarantine(self.tree, self.area.folder, self.recipe, *scene, failure, outcome.attempts)
+        self.quarantined.add(scene)
+
+    def _take_scene(self, scene: Scene, manifest: SceneManifest, attempts: int) -> None:
+        size = sum(entry.size for entry in manifest.files)
+        self.rendered += 1
+        self.bytes_written += size
+        if scene in self.quarantined:
+            release(self.tree, *scene)
+            self.quarantined.remove(scene)
+        name = f"{scene[0]}/{scene[1]:04d}"
+        self.log.write("scene_committed", scene=name, bytes=size, seconds=manifest.seconds, attempts=attempts)
+
+    def _no_room_left(self) -> bool:
+        return isinstance(self.tree, LocalTree) and shutil.disk_usage(self.tree.root).free < NO_ROOM_BYTES
+
+    def _disk_full_sentence(self) -> str:
+        left = self.total - self.rendered
+        need = f", about {left * self.bytes_written / self.rendered / 1e6:.0f} MB" if self.rendered else ""
+        return (
+            f"{self.tree.name}: the disk is full; {left} scenes are missing{need}: make room and run the same "
+            "command again"
+        )
+
+
+def _check_possible(
+    recipe: Recipe, device: str, executor: Executor, tree: Tree, wanted: Sequence[tuple[str, int]]
+) -> None:
+    """Raise DatasetError for what no scene would be rendered with, instead of putting all of them in quarantine."""
+    asks = device != "cpu" or recipe.curation.disparity_px is not None
+    if not asks or not set(wanted) - committed_scenes(tree):  # to list a large store takes a while
+        return
+    if isinstance(executor, LocalExecutor) or (isinstance(executor, RayExecutor) and executor.runs_here):
+        check_device(device)
+    check_disparity_range(recipe)
+
+
+def _merge(tree: Tree, recipe: Recipe) -> Recipe:
+    """The recipe of a new place, or the one that is there with what `recipe` adds. Changes nothing."""
+    name = Layout(Path()).recipe.name
+    if tree.exists(name):
+        existing = recipe_from_text(tree.read(name), f"{tree.name}/{name}")
+        return merge_into(existing, recipe, tree.name)
+    if set(tree.files_in("")) - {STAGING_FOLDER}:
+        raise DatasetError(f"{tree.name} is neither empty nor a data set; give a new or empty folder")
+    return recipe
+
+
+def _check_store(tree: Tree, recipe: Recipe) -> None:
+    """Raise DatasetError unless the user's files that a recipe names are in the data set's own store."""
+    pool = recipe.assets
+    if not pool:
+        return
+    if not isinstance(tree, LocalTree):
+        raise DatasetError(f"{tree.name}: a recipe with files of your own needs a folder, not a URL")
+    store = Layout(tree.root).assets
+    for asset in (*pool.meshes, *pool.textures, *pool.environments):
+        if not (store / f"{asset.sha256}.npz").is_file():
+            raise DatasetError(
+                f"{tree.name} has no prepared file of {asset.name}, which the recipe names: give the folders of "
+                "your own files again"
+            )
+
+
+def _write_recipe(tree: Tree, area: StagingArea, recipe: Recipe) -> None:
+    """By way of the staging area, so that a run killed meanwhile leaves no temporary file."""
+    staged = Layout(area.folder).recipe
+    write_recipe(staged, recipe)
+    if not tree.exists(staged.name) or tree.read(staged.name) != staged.read_bytes():
+        tree.adopt(staged, staged.name)
+
+
+def committed_scenes(tree: Tree) -> set[Scene]:
+    """Every scene that is whole."""
+    folders = {split: Layout(Path()).manifest(split, 0).parent.as_posix() for split in SPLITS}
+    return {
+        (split, scene) for split, folder in folders.items() for scene in scene_numbers(tree.files_in(folder))
+    }
+
+
+def _wanted(recipe: Recipe, shard: tuple[int, int]) -> Iterator[Scene]:
+    index, count = shard
+    if not 0 <= index < count:
+        raise DatasetError(f"shard {index}/{count} does not exist: it takes 0 <= I < N")
+    for split, scenes in recipe.scenes.items():
+        for scene in range(index, scenes, count):
+            yield split, scene

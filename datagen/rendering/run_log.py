@@ -1,0 +1,45 @@
+"""What a run did, as JSON lines: `logs/render-<time>-<host>-<pid>.jsonl`. No part of the data."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from stereoforge_kit.files import LocalTree, Tree
+
+LOGS_FOLDER = "logs"
+
+
+class RunLog:
+    """One line an event, each in the file when `write` returns."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+
+    def write(self, event: str, **fields: Any) -> None:
+        """Add a line: the time (UTC, ISO 8601), the event's name and whatever belongs to it."""
+        line = {"time": datetime.now(UTC).isoformat(timespec="milliseconds"), "event": event, **fields}
+        with suppress(OSError):  # A full disk is reported by the run itself; its log must not hide that.
+            os.write(self._descriptor, (json.dumps(line) + "\n").encode())
+
+
+@contextmanager
+def run_log(tree: Tree, scratch: Path) -> Iterator[RunLog]:
+    """A new log in the data set's `logs`; behind a URL it arrives when the run ends, from `scratch`."""
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%f")
+    name = f"{LOGS_FOLDER}/render-{stamp}-{socket.gethostname()}-{os.getpid()}.jsonl"
+    path = tree.root / name if isinstance(tree, LocalTree) else scratch / Path(name).name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    try:
+        yield RunLog(descriptor)
+    finally:
+        os.close(descriptor)
+        if not isinstance(tree, LocalTree):
+            tree.adopt(path, name)

@@ -1,0 +1,219 @@
+"""One scene from recipe to committed files: what a worker process does."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from datagen.dataset.layout import FIRST_FRAME, RENDER_PASSES, Direction, Eye, Layout
+from datagen.dataset.manifest import SceneManifest, file_entry, write_manifest
+from datagen.errors import DatasetError
+from datagen.formats import (
+    write_camera_data,
+    write_flow,
+    write_gradient,
+    write_mask,
+    write_normals,
+    write_occlusion,
+    write_pfm,
+    write_png,
+)
+from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME
+from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.recipe.curation import TEXTURELESS, fault_before_rendering, is_textureless
+from datagen.recipe.recipe import Recipe
+from datagen.rendering.frames import BLENDER_LOG, EyeTargets, RenderOptions, Stopwatch, render_frames
+from datagen.rendering.staging import StagingArea
+from scenes import Scene, scene_to_json
+from scenes.user_assets.pool import UserEnvironment, UserMesh, UserTexture, use_store
+from stereoforge_kit.files import LocalTree, Tree, write_text
+
+
+@dataclass(frozen=True)
+class SceneJob:
+    """One scene to render, and with what."""
+
+    tree: Tree
+    """Where the data set is."""
+    area: StagingArea
+    """Where the scene is made."""
+    recipe: Recipe
+    split: str
+    scene: int
+    device: str = "cpu"
+    threads: int = 1
+
+    @property
+    def name(self) -> str:
+        return f"{self.split}/{self.scene:04d}"
+
+
+def render_scene(job: SceneJob) -> SceneManifest:
+    """Render, measure and commit one scene.
+
+    Everything is written to a staging folder first and moved into place at the end, the manifest last, so
+    that a scene with a manifest is whole whatever happens.
+    """
+    with job.area.scene_folder(job.split, job.scene) as staging:
+        watch = Stopwatch()
+        statistics = _render_staged(job, staging, watch)
+        return _commit(job, staging, watch, statistics)
+
+
+def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, Any]:
+    """Stage the first attempt at the scene that is not degenerate, all files but its manifest; its statistics."""
+    if isinstance(job.tree, LocalTree):
+        use_store(Layout(job.tree.root).assets)
+    rejected: Counter[str] = Counter()
+    for attempt in range(job.recipe.curation.attempts):
+        with watch.step("sample"):
+            scene = job.recipe.sample(job.split, job.scene, attempt)
+            caster = SceneRayCaster(SceneGeometry(scene))
+        with watch.step("ground_truth"):  # The tree of triangles built here serves the first frame too.
+            fault = fault_before_rendering(caster, job.recipe.curation)
+        frames = None if fault else _render_attempt(job, staging, caster, watch)
+        if frames is not None:
+            statistics = _scene_statistics(scene, frames, rejected)
+            return statistics | {"assets": _assets_used(job.recipe, scene)}
+        rejected[fault or TEXTURELESS] += 1
+    reasons = ", ".join(f"{reason} ({count})" for reason, count in rejected.most_common())
+    raise DatasetError(
+        f"scene {job.name}: {job.recipe.curation.attempts} attempts were degenerate: {reasons}"
+    )
+
+
+def _render_attempt(
+    job: SceneJob, staging: Path, caster: SceneRayCaster, watch: Stopwatch
+) -> list[dict[str, float]] | None:
+    """Render and stage a scene; its frames' statistics, or None if its first picture is textureless."""
+    recipe, staged, scene = job.recipe, Layout(staging), caster.geometry.scene
+    options = RenderOptions(
+        recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets, recipe.passes
+    )
+    statistics: list[dict[str, float]] = []
+    with closing(render_frames(scene, staging, options, watch, caster)) as frames:
+        for frame, targets in frames:
+            if frame == 0 and is_textureless(next(iter(targets["left"].images.values())), recipe.curation):
+                return None
+            with watch.step("write"):
+                for eye, arrays in targets.items():
+                    _write_eye(staged, job, eye, FIRST_FRAME + frame, arrays)
+                statistics.append(_frame_statistics(targets["left"]))
+    with watch.step("write"):
+        _write_scene_files(staged, job, scene)
+    (staging / BLENDER_LOG).unlink(missing_ok=True)
+    return statistics
+
+
+_EXTRA_WRITERS: dict[str, Callable[[Path, Any], None]] = {
+    "material_index": write_png,
+    "normals": write_normals,
+    "optical_flow": write_flow,
+    "disparity_change": write_pfm,
+    "motion_boundaries": write_mask,
+}
+
+
+def _write_eye(layout: Layout, job: SceneJob, eye: Eye, number: int, arrays: EyeTargets) -> None:
+    def path(kind: str, direction: Direction | None = None) -> Path:
+        return layout.file(kind, job.split, job.scene, eye, number, direction)
+
+    for name, image in arrays.images.items():
+        write_png(path(RENDER_PASSES[name]), image)
+    write_pfm(path("disparity"), arrays.disparity)
+    write_gradient(path("disparity_gradient"), arrays.gradient, arrays.gradient_valid)
+    write_occlusion(path("occlusion"), arrays.occlusion)
+    write_png(path("object_index"), arrays.object_index)
+    for (kind, direction), values in arrays.extra.items():
+        _EXTRA_WRITERS[kind](path(kind, direction), values)
+
+
+def _write_scene_files(layout: Layout, job: SceneJob, scene: Scene) -> None:
+    poses = {
+        FIRST_FRAME + frame: (scene.camera.pose("left", frame), scene.camera.pose("right", frame))
+        for frame in range(scene.frames)
+    }
+    write_camera_data(layout.file("camera_data", job.split, job.scene), poses)
+    write_text(layout.scene_record(job.split, job.scene), scene_to_json(scene))
+
+
+def _frame_statistics(left: EyeTargets) -> dict[str, float]:
+    low, middle, high = np.percentile(left.disparity, (1, 50, 99))
+    return {
+        "disparity_p01_px": float(low),
+        "disparity_median_px": float(middle),
+        "disparity_p99_px": float(high),
+        "occluded_share": float((left.occlusion == OCCLUDED).mean()),
+        "out_of_frame_share": float((left.occlusion == OUT_OF_FRAME).mean()),
+        "gradient_valid_share": float(left.gradient_valid.mean()),
+        "mean_level": float(next(iter(left.images.values())).mean()),
+        "visible_objects": float(np.count_nonzero(np.unique(left.object_index))),
+    }
+
+
+def _scene_statistics(scene: Scene, frames: list[dict[str, float]], rejected: Counter[str]) -> dict[str, Any]:
+    """Counts, the means over the frames of what was measured in the left eye, and what was rejected why."""
+    means = {key: round(float(np.mean([frame[key] for frame in frames])), 5) for key in frames[0]}
+    return {"objects": len(scene.objects), "frames": scene.frames, **means, "rejected": dict(rejected)}
+
+
+def _assets_used(recipe: Recipe, scene: Scene) -> list[str]:
+    """The names of the user's own files in a scene."""
+    own = (
+        *(thing.shape for thing in scene.objects),
+        *(material.color for material in scene.materials),
+        scene.world.environment,
+    )
+    used = {item.sha256 for item in own if isinstance(item, UserMesh | UserTexture | UserEnvironment)}
+    pool = recipe.assets
+    return sorted(a.name for a in (*pool.meshes, *pool.textures, *pool.environments) if a.sha256 in used)
+
+
+def _commit(job: SceneJob, staging: Path, watch: Stopwatch, statistics: dict[str, Any]) -> SceneManifest:
+    """Move the staged scene into the data set and make it exist by putting its manifest there."""
+    files = sorted(path for path in staging.rglob("*") if path.is_file())
+    manifest = _manifest(job, staging, files, watch, statistics)
+    staged_manifest = Layout(staging).manifest(job.split, job.scene)
+    write_manifest(staged_manifest, manifest)
+    name = staged_manifest.relative_to(staging).as_posix()
+    with job.area.committing(job.split, job.scene):
+        if not job.tree.exists(name):
+            for source in sorted({_unit(path, staging) for path in files}):
+                job.tree.adopt(source, source.relative_to(staging).as_posix())
+            job.tree.adopt(staged_manifest, name)
+    return manifest
+
+
+def _manifest(
+    job: SceneJob, staging: Path, files: list[Path], watch: Stopwatch, statistics: dict[str, Any]
+) -> SceneManifest:
+    from datagen.blender.session import blender_version
+
+    return SceneManifest(
+        family=job.recipe.family,
+        split=job.split,
+        scene=job.scene,
+        recipe_sha256=job.recipe.settings_sha256(),
+        files=tuple(file_entry(staging, path) for path in files),
+        seconds=watch.seconds,
+        statistics=statistics,
+        versions={
+            "stereoforge": version("stereoforge"),
+            "blender": blender_version(),
+            "numpy": np.__version__,
+        },
+    )
+
+
+def _unit(path: Path, root: Path) -> Path:
+    """What is moved as a whole for a staged file: a scene's folder, or the scene's single record."""
+    kind, split, group, scene, *_ = path.relative_to(root).parts
+    return root / kind / split / group / scene

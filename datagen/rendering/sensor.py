@@ -1,0 +1,49 @@
+"""What the camera itself adds to a final picture: vignetting, unequal eyes, photon noise. Pure numpy."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.dataset.layout import EYES, Eye
+from scenes import Scene, scene_to_json
+from scenes.spec import FinalPass
+
+
+class Sensor:
+    """The two eyes' sensors of a scene; noise follows from the Scene record, the frame and the eye."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._final = scene, scene.final
+
+    @cached_property
+    def _seed(self) -> int:
+        digest = hashlib.sha256(scene_to_json(self._scene).encode()).digest()
+        return int.from_bytes(digest[:8], "big")
+
+    def expose(
+        self, radiance: NDArray[np.float32], exposure: float, eye: Eye, frame: int
+    ) -> NDArray[np.float32]:
+        """(H, W, 3) light on the sensor, 1 is full white, of linear radiance and the scene's exposure."""
+        light = radiance * np.float32(exposure) * vignette(self._final, *radiance.shape[:2])[..., None]
+        if eye == "right":
+            light = light * np.float32(2.0**self._final.exposure_difference_ev)
+            light = light * np.array(self._final.right_eye_color, np.float32)
+        if self._final.noise > 0:
+            rng = np.random.default_rng((self._seed, frame, EYES.index(eye)))
+            # Photons arrive independently: the deviation of their number grows with the root of it.
+            deviation = self._final.noise * np.sqrt(np.clip(light, 0.0, 1.0))
+            light = light + deviation * rng.standard_normal(light.shape, np.float32)
+        return light.astype(np.float32)
+
+
+def vignette(final: FinalPass, height: int, width: int) -> NDArray[np.float32]:
+    """(H, W) share of the light that is left: falls with the square of the distance from the centre."""
+    x = (np.arange(width) + 0.5) / width * 2 - 1
+    y = ((np.arange(height) + 0.5) / height * 2 - 1)[:, None]
+    aspect = height / width
+    squared = (x**2 + (y * aspect) ** 2) / (1 + aspect**2)
+    return (1 - final.vignetting * squared).astype(np.float32)

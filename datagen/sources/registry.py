@@ -1,0 +1,110 @@
+"""Where frames come from: one way to open every data set that can be trained or evaluated on.
+
+A source is written `[FORMAT:]LOCATION[#FIRST-LAST]`, for example `data`, `kitti2015:/sets/kitti`, `sintel:sets/sintel`,
+`webdataset:s3://bucket/set` or `kitti2015:/sets/kitti#0-99` (its first hundred frames). Without a format the folder's
+own structure tells it. A new format is one module in `datagen.sources` with a tuple `FORMATS`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from datagen.errors import DatasetError
+from datagen.sources.stereo_frame import StereoFrame
+
+_SELECTION = re.compile(r"(.+)#(\d{1,9})-(\d{1,9})")
+
+
+@dataclass(frozen=True)
+class SourceFormat:
+    """How one kind of data set is recognised and listed."""
+
+    name: str
+    title: str
+    """What it is, for error messages and documentation."""
+    recognises: Callable[[Path], bool]
+    """Whether a folder looks like it. Never True for a folder of another format."""
+    find_frames: Callable[[str, str], Sequence[StereoFrame]]
+    """(location, split) to the frames with ground truth, in order. A format without splits ignores the split."""
+    splits: tuple[str, ...] = ()
+    """The splits that the format itself tells apart; empty if all its frames belong to every split."""
+
+
+@dataclass(frozen=True)
+class DataSource:
+    """An opened data set."""
+
+    format: SourceFormat
+    location: str
+    selection: tuple[int, int] | None = None
+    """Numbers of the first and the last frame taken, of those in order; None takes all."""
+
+    def frames(self, split: str) -> Sequence[StereoFrame]:
+        """The frames of a split: "train", "val" or "test".
+
+        A set without splits of its own gives all its frames for each, and one with other splits none for those
+        it does not have. Raises DatasetError if there is nothing, or less than the selection asks for.
+        """
+        if self.format.splits and split not in self.format.splits:
+            raise DatasetError(f"{self.location}: {self.format.title} has no split {split!r}")
+        frames = self.format.find_frames(self.location, split)
+        if not len(frames):
+            raise DatasetError(
+                f"{self.location}: has no frame with ground truth in the layout of {self.format.title}"
+            )
+        if self.selection is None:
+            return frames
+        first, last = self.selection
+        if not first <= last < len(frames):
+            raise DatasetError(
+                f"{self.location}: frames {first} to {last} were asked for, it has {len(frames)} (from 0)"
+            )
+        return frames[first : last + 1]
+
+    def validation_frames(self) -> Sequence[StereoFrame]:
+        """The frames of the set's own validation split, empty where it has none."""
+        return self.format.find_frames(self.location, "val") if "val" in self.format.splits else []
+
+    def held_out_frames(self) -> Sequence[StereoFrame]:
+        """What to validate on when the whole source is meant for it: its val split, else its test split, else all
+        of it. Raises DatasetError as `frames` does."""
+        splits = self.format.splits
+        return self.frames("test" if "val" not in splits else "val")
+
+
+def open_source(text: str | Path) -> DataSource:
+    """Open what `[FORMAT:]LOCATION[#FIRST-LAST]` says.
+
+    Raises DatasetError for a folder that is missing, or that no format (or more than one) recognises.
+    """
+    location, selection = str(text), None
+    if not Path(location).exists() and (match := _SELECTION.fullmatch(location)):
+        location, selection = match[1], (int(match[2]), int(match[3]))
+    prefix, colon, rest = location.partition(":")
+    formats = source_formats()
+    if colon and prefix in formats and not Path(location).exists():
+        return DataSource(formats[prefix], rest, selection)
+    if "://" in location:
+        raise DatasetError(f"{location}: say what is there, for example webdataset:{location}")
+    folder = Path(location)
+    if not folder.exists():
+        raise DatasetError(f"{folder}: there is no such folder")
+    found = [kind for kind in formats.values() if kind.recognises(folder)]
+    if len(found) != 1:
+        what = " and ".join(kind.title for kind in found) or "no data set of a known layout"
+        raise DatasetError(
+            f"{folder}: looks like {what}; name the format in front, such as {next(iter(formats))}:{folder} "
+            f"(there are {', '.join(formats)})"
+        )
+    return DataSource(found[0], location, selection)
+
+
+def source_formats() -> dict[str, SourceFormat]:
+    """Every format by its name."""
+    import datagen.sources
+    from scenes.discovery import modules_in
+
+    return {kind.name: kind for module in modules_in(datagen.sources) for kind in getattr(module, "FORMATS", ())}

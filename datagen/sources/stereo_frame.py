@@ -1,0 +1,160 @@
+"""One rectified pair with ground truth, whichever data set it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Protocol, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.errors import DatasetError
+from datagen.ground_truth.from_disparity import derive_gradient, derive_occlusion
+
+Picture = NDArray[np.uint8]
+DisparityMap = NDArray[np.float32]
+
+
+class StereoFrame(Protocol):
+    """What every source's frames have; a `StereoSample` of our own sets is one, with more beside it.
+
+    Arrays are read when they are asked for. Reading raises DatasetError, naming the file.
+    """
+
+    @property
+    def name(self) -> str:
+        """Unique within its source."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+
+    @property
+    def left(self) -> Picture:
+        """(H, W, 3) sRGB."""
+
+    @property
+    def right(self) -> Picture:
+        """(H, W, 3) sRGB."""
+
+    @property
+    def disparity_left(self) -> DisparityMap:
+        """(H, W) pixels, x_right = x_left - d; NaN invalid, 0 infinitely far."""
+
+    @property
+    def disparity_right(self) -> DisparityMap | None:
+        """(H, W) pixels, x_left = x_right + d; None where the set has none."""
+
+    @property
+    def gradient_left(self) -> NDArray[np.float32]:
+        """(H, W, 2) forward differences [dx, dy], 0 where there is none."""
+
+    @property
+    def gradient_valid_left(self) -> NDArray[np.bool_]:
+        """(H, W) where the gradient exists and is no discontinuity."""
+
+    @property
+    def occlusion_left(self) -> NDArray[np.uint8] | None:
+        """(H, W) 0 visible in the right image, 1 occluded, 2 out of its frame; None where nobody knows."""
+
+    @property
+    def object_index_left(self) -> NDArray[np.uint16] | None:
+        """(H, W) 0 background, else a number an object; None where the set has none."""
+
+
+@dataclass(frozen=True)
+class FileFrame:
+    """A frame of somebody else's data set: how each of its arrays is read, None for what the set does not have.
+
+    Gradients are always derived from the disparity; occlusion is the set's own where `read_occlusion_left` is
+    given, derived from both disparities where the set has both, and unknown otherwise.
+    """
+
+    name: str
+    read_left: Callable[[], Picture]
+    read_right: Callable[[], Picture]
+    read_disparity_left: Callable[[], DisparityMap]
+    read_disparity_right: Callable[[], DisparityMap] | None = None
+    read_occlusion_left: Callable[[], NDArray[np.uint8]] | None = None
+    read_object_index_left: Callable[[], NDArray[np.uint16]] | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        height, width = self.left.shape[:2]
+        return height, width
+
+    @cached_property
+    def left(self) -> Picture:
+        return self.read_left()
+
+    @cached_property
+    def right(self) -> Picture:
+        return self._checked("right image", self.read_right())
+
+    @cached_property
+    def disparity_left(self) -> DisparityMap:
+        return self._checked("left disparity", self.read_disparity_left())
+
+    @cached_property
+    def disparity_right(self) -> DisparityMap | None:
+        if self.read_disparity_right is None:
+            return None
+        return self._checked("right disparity", self.read_disparity_right())
+
+    @property
+    def gradient_left(self) -> NDArray[np.float32]:
+        return self._gradient_left[0]
+
+    @property
+    def gradient_valid_left(self) -> NDArray[np.bool_]:
+        return self._gradient_left[1]
+
+    @cached_property
+    def occlusion_left(self) -> NDArray[np.uint8] | None:
+        if self.read_occlusion_left is not None:
+            return self._checked("occlusion", self.read_occlusion_left())
+        if self.disparity_right is None:
+            return None
+        return derive_occlusion("left", self.disparity_left, self.disparity_right)
+
+    @cached_property
+    def object_index_left(self) -> NDArray[np.uint16] | None:
+        if self.read_object_index_left is None:
+            return None
+        return self._checked("object index", self.read_object_index_left())
+
+    @cached_property
+    def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        return derive_gradient(self.disparity_left)
+
+    def _checked(self, what: str, array: NDArray[Any]) -> NDArray[Any]:
+        if array.shape[:2] != self.size:
+            raise DatasetError(
+                f"{self.name}: its {what} is {array.shape[1]}x{array.shape[0]}, "
+                f"its left image {self.size[1]}x{self.size[0]}"
+            )
+        return array
+
+
+class FileFrames(Sequence[StereoFrame]):
+    """Frames of somebody else's data set. A frame keeps what it has read, so it is handed out anew every time:
+    nothing piles up in a run that goes through a set many times."""
+
+    def __init__(self, frames: Iterable[FileFrame]) -> None:
+        self._frames = tuple(frames)
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    @overload
+    def __getitem__(self, index: int) -> StereoFrame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> FileFrames: ...
+
+    def __getitem__(self, index: int | slice) -> StereoFrame | FileFrames:
+        if isinstance(index, slice):
+            return FileFrames(self._frames[index])
+        return replace(self._frames[index])

@@ -1,0 +1,1 @@
+"""Every file against its manifest, every disparity against its scene; and repair."""

@@ -1,0 +1,213 @@
+"""What the arrays of one frame must satisfy among themselves. Each check yields one sentence a problem.
+
+The limits on shares of pixels leave room for silhouettes, where the rounding of rays decides, and for things
+thinner than a pixel, which the neighbouring pixels of the other view miss. Measured on flying_things from
+96 x 54 to 480 x 270, the largest shares are a tenth to a third of the limits; an error of convention (sign,
+half a pixel, swapped views) moves nearly all pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+
+from datagen.dataset.layout import Eye
+from datagen.ground_truth.labels import (
+    OCCLUDED,
+    OUT_OF_FRAME,
+    VISIBLE,
+    forward_differences,
+    gradient_validity,
+)
+from datagen.ground_truth.raycast import Hits
+
+CONSISTENCY_TOLERANCE_PX = 0.25
+"""How far a visible pixel's disparity may lie outside those of the two pixels it falls between."""
+NEARER_PX = 1e-2
+"""What hides a point has a disparity greater than the point's by more than this."""
+MAX_INCONSISTENT = 0.1
+"""Share of pixels whose two views may disagree, by what the neighbouring pixels there show."""
+FRAME_TIE_PX = 1e-3
+"""A point this close to the other frame's edge may be labelled either way."""
+GEOMETRY_TOLERANCE_PX = 1e-2
+MAX_OFF_GEOMETRY = 0.01
+"""Share of sampled pixels that may differ from the scene's geometry by more than the tolerance."""
+MAX_OFF_LABELS = 0.03
+"""Share of sampled pixels whose occlusion may differ: boundaries of occlusion are longer than silhouettes."""
+MIN_COUNTED = 50
+"""Shares of fewer pixels than this say nothing."""
+
+
+def check_disparity(disparity: NDArray[np.float32]) -> Iterator[str]:
+    """Finite and not negative everywhere: a rendered world has no pixel without ground truth."""
+    wrong = int((~np.isfinite(disparity)).sum())
+    if wrong:
+        yield f"{wrong} disparities are not finite"
+    negative = int((disparity < 0).sum())
+    if negative:
+        yield f"{negative} disparities are negative, the least {np.nanmin(disparity):.3f} px"
+
+
+def check_gradient(
+    disparity: NDArray[np.float32],
+    gradient: NDArray[np.float32],
+    valid: NDArray[np.bool_],
+    threshold_px: float,
+) -> Iterator[str]:
+    """Valid gradients are the disparity's forward differences; valid is where none passes the threshold."""
+    expected = forward_differences(disparity)
+    wrong = int(((gradient != expected).any(axis=-1) & valid).sum())
+    if wrong:
+        yield f"{wrong} valid gradients are not the forward differences of the disparity"
+    wrong = int((gradient_validity(expected, threshold_px) != valid).sum())
+    if wrong:
+        yield f"{wrong} pixels of the gradient's mask do not follow from the threshold of {threshold_px} px"
+
+
+def check_object_index(
+    index: NDArray[np.uint16], disparity: NDArray[np.float32], objects: int
+) -> Iterator[str]:
+    """Indices name objects that exist, and the sky (index 0) is what is infinitely far."""
+    if index.max() > objects:
+        yield f"object index {index.max()} is beyond the scene's {objects} objects"
+    wrong = int(((index == 0) != (disparity == 0)).sum())
+    if wrong:
+        yield f"{wrong} pixels are sky in one of object index and disparity but not in the other"
+
+
+def check_views(
+    eye: Eye,
+    disparity: NDArray[np.float32],
+    other_disparity: NDArray[np.float32],
+    occlusion: NDArray[np.uint8],
+) -> Iterator[str]:
+    """The two views' disparities and the labels agree, seen from `eye`.
+
+    A visible point has in the other view a disparity between those of the two pixels it falls between; an
+    occluded one falls on or beside something nearer; one is out of the frame if its x says so.
+    """
+    x, low, high = _in_other_view(eye, disparity, other_disparity)
+    width = disparity.shape[1]
+    outside = (x < 0) | (x > width)
+    tie = np.minimum(np.abs(x), np.abs(x - width)) < FRAME_TIE_PX
+    wrong = int((((occlusion == OUT_OF_FRAME) != outside) & ~tie).sum())
+    if wrong:
+        yield f"{wrong} pixels are labelled against where their disparity puts them in the other frame"
+    tolerance = CONSISTENCY_TOLERANCE_PX
+    unmet = (disparity < low - tolerance) | (disparity > high + tolerance)
+    yield from _too_many(
+        unmet[occlusion == VISIBLE],
+        MAX_INCONSISTENT,
+        "visible pixels have another disparity than the other view has there",
+    )
+    # What hides a point may be thinner than a pixel and miss the centres next to it: look one pixel further.
+    _, _, nearest = _in_other_view(eye, disparity, maximum_filter(other_disparity, size=3))
+    yield from _too_many(
+        (nearest <= disparity + NEARER_PX)[occlusion == OCCLUDED],
+        MAX_INCONSISTENT,
+        "occluded pixels have nothing nearer before them in the other view",
+    )
+
+
+def check_images(
+    left: NDArray[np.uint8],
+    right: NDArray[np.uint8],
+    disparity_left: NDArray[np.float32],
+    occlusion_left: NDArray[np.uint8],
+) -> Iterator[str]:
+    """The right image warped by the left disparity is more like the left one than warped the wrong way."""
+    visible = (occlusion_left == VISIBLE) & (disparity_left > 1)
+    if visible.sum() < MIN_COUNTED:
+        return
+    right_way = _warp_error(left, right, disparity_left, visible)
+    wrong_way = _warp_error(left, right, -disparity_left, visible)
+    # Textureless pairs fit either way about equally well; only a clear preference for the wrong way counts.
+    if right_way > 1.2 * wrong_way + 1:
+        yield (
+            f"the images fit the disparity with its sign turned better ({wrong_way:.1f} grey levels of "
+            f"difference) than as it is ({right_way:.1f}): the views are swapped"
+        )
+
+
+def check_geometry(
+    disparity: NDArray[np.float32],
+    object_index: NDArray[np.uint16],
+    occlusion: NDArray[np.uint8],
+    expected: Hits,
+) -> Iterator[str]:
+    """Sampled pixels (N,) agree with the rays cast at the scene's meshes."""
+    error = np.abs(disparity - expected.disparity)
+    tolerance = GEOMETRY_TOLERANCE_PX
+    sentence = f"sampled disparities are over {tolerance} px from the scene's geometry"
+    yield from _too_many(
+        ~(error <= tolerance), MAX_OFF_GEOMETRY, f"{sentence} (median {np.median(error):.3g} px)"
+    )
+    yield from _too_many(
+        object_index != expected.object_index,
+        MAX_OFF_GEOMETRY,
+        "sampled object indices are not those of the scene's geometry",
+    )
+    yield from _too_many(
+        occlusion != expected.occlusion,
+        MAX_OFF_LABELS,
+        "sampled occlusion labels are not those of the scene's geometry",
+    )
+
+
+def check_vectors(
+    values: NDArray[np.float32], expected: NDArray[np.float32], tolerance: float
+) -> Iterator[str]:
+    """Sampled values (N,) or (N, C) of a target agree with the scene's geometry; NaN where that is NaN."""
+    with np.errstate(invalid="ignore"):
+        same = np.abs(values - expected) <= tolerance * np.maximum(1, np.abs(expected))
+    same |= np.isnan(values) & np.isnan(expected)
+    yield from _too_many(
+        ~same.reshape(len(same), -1).all(axis=1),
+        MAX_OFF_GEOMETRY,
+        f"sampled values are over {tolerance} from the scene's geometry",
+    )
+
+
+def check_derived(values: NDArray[Any], expected: NDArray[Any], origin: str) -> Iterator[str]:
+    """A target (H, W) is what follows from others; `origin` names those."""
+    wrong = int((values != expected).sum())
+    if wrong:
+        yield f"{wrong} pixels are marked otherwise than {origin} say"
+
+
+def _in_other_view(
+    eye: Eye, disparity: NDArray[np.float32], other_disparity: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]:
+    """Where each pixel's point lies in the other view: its x there, and the least and the greatest disparity
+    of the two pixels whose centres it lies between."""
+    width = disparity.shape[1]
+    sign = -1.0 if eye == "left" else 1.0
+    x = np.arange(width) + 0.5 + sign * disparity.astype(np.float64)
+    first = np.floor(np.clip(x - 0.5, -1, width)).astype(np.int64)
+    rows = np.arange(len(disparity))[:, None]
+    one = other_disparity[rows, np.clip(first, 0, width - 1)]
+    two = other_disparity[rows, np.clip(first + 1, 0, width - 1)]
+    return x, np.minimum(one, two), np.maximum(one, two)
+
+
+def _warp_error(
+    left: NDArray[np.uint8],
+    right: NDArray[np.uint8],
+    disparity: NDArray[np.float32],
+    mask: NDArray[np.bool_],
+) -> float:
+    """Mean absolute difference, in grey levels, of the left image and the right one fetched by x - d."""
+    rows, columns = np.nonzero(mask)
+    source = np.rint(columns - disparity[mask]).astype(np.int64)
+    fetched = right[rows, np.clip(source, 0, right.shape[1] - 1)]
+    return float(np.abs(left[mask].astype(np.int16) - fetched.astype(np.int16)).mean())
+
+
+def _too_many(wrong: NDArray[Any], limit: float, what: str) -> Iterator[str]:
+    share = float(wrong.mean()) if wrong.size >= MIN_COUNTED else 0.0
+    if share > limit:
+        yield f"{share:.1%} of the {wrong.size} {what}"

@@ -1,0 +1,57 @@
+"""Rendering again what `verify` found broken, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+
+from datagen.dataset.layout import SPLITS, Layout
+from datagen.dataset.manifest import SceneManifest
+from datagen.dataset.samples import open_layout
+from datagen.executors import Executor
+from datagen.recipe.recipe import read_recipe
+from datagen.rendering.run import RenderSummary, render_dataset
+from datagen.rendering.staging import discard_uncommitted
+from datagen.verify.report import Problem
+
+
+def broken_scenes(problems: Iterable[Problem]) -> list[tuple[str, int]]:
+    """(split, scene) of every finished scene that a problem lies in, in order."""
+    found = {
+        (item.split, item.scene) for item in problems if item.split is not None and item.scene is not None
+    }
+    return sorted(found, key=lambda scene: (SPLITS.index(scene[0]), scene[1]))
+
+
+def problems_left(problems: Iterable[Problem], repaired: list[tuple[str, int]]) -> list[Problem]:
+    """Those that lie in no finished scene, without the files that a repaired scene has replaced or taken in."""
+    paths = [PurePosixPath(path) for scene in repaired for path in Layout(Path()).scene_paths(*scene)]
+    return [
+        problem
+        for problem in problems
+        if problem.scene is None
+        and not any(PurePosixPath(problem.place).is_relative_to(path) for path in paths)
+    ]
+
+
+def repair_dataset(
+    root: Path | str,
+    broken: list[tuple[str, int]],
+    *,
+    executor: Executor | None = None,
+    on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
+) -> RenderSummary:
+    """Remove finished scenes and render them again; interrupted, any later render of the set does the rest.
+
+    Raises DatasetError as `render_dataset` does.
+    """
+    layout = open_layout(root)
+    recipe = read_recipe(layout.recipe)
+    for split, scene in broken:
+        layout.tree.remove(Layout(Path()).manifest(split, scene).as_posix())
+        discard_uncommitted(layout.tree, split, scene)
+    # A scene beyond the recipe's numbers has no way to be rendered again: it was never asked for.
+    splits = {split for split, _ in broken}
+    asked = replace(recipe, scenes={split: recipe.scenes.get(split, 0) for split in splits})
+    return render_dataset(asked, root, executor=executor, only=broken, on_scene=on_scene)

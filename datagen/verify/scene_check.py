@@ -1,0 +1,148 @@
+"""All checks of one finished scene: its manifest, its files, its Scene record, its frames' arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from datagen.dataset.integrity import compare
+from datagen.dataset.layout import EYES, FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, Layout
+from datagen.dataset.manifest import FileEntry, SceneManifest, read_manifest
+from datagen.dataset.samples import StereoSample, read_scene
+from datagen.errors import DatasetError
+from datagen.formats import read_camera_data
+from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.recipe.recipe import Recipe
+from datagen.verify.frame_check import FrameCheck
+from datagen.verify.report import Problem
+from scenes import Scene
+
+SAMPLED_PIXELS = 500
+"""How many random pixels of each view are compared with the scene's geometry by default."""
+POSE_TOLERANCE = 1e-9
+
+
+@dataclass
+class SceneCheck:
+    """Checks one scene; `run` gathers what is wrong in `problems` and never raises for damaged data."""
+
+    layout: Layout
+    recipe: Recipe
+    split: str
+    scene: int
+    sampled_pixels: int = SAMPLED_PIXELS
+    problems: list[Problem] = field(default_factory=list)
+    known: set[str] = field(default_factory=set)
+    """The scene's files, relative to the root."""
+    frames: int = 0
+    files: int = 0
+    bytes_read: int = 0
+    _whole: set[str] = field(default_factory=set)
+    """Those of the files that are as they were written."""
+
+    def run(self) -> SceneCheck:
+        path = self.layout.manifest(self.split, self.scene)
+        self.known.add(self.layout.relative(path))
+        try:
+            manifest = read_manifest(self.layout.local(path))
+        except DatasetError as error:
+            self._failed(error)
+            return self
+        self._check_head(path, manifest)
+        self.known.update(entry.path for entry in manifest.files)
+        self._whole.update(entry.path for entry in manifest.files if self._is_whole(entry))
+        record = self.layout.scene_record(self.split, self.scene)
+        if self._are_readable([record]):
+            try:
+                scene = read_scene(record)
+            except DatasetError as error:
+                self._failed(error)
+            else:
+                caster = SceneRayCaster(SceneGeometry(scene)) if self.sampled_pixels else None
+                self._check_contents(scene, caster)
+        return self
+
+    def could_not_run(self, sentence: str) -> None:
+        """Note that the process that ran this check did not survive it."""
+        self._found(self.layout.scene_record(self.split, self.scene), f"could not be checked: {sentence}")
+
+    def _found(self, path: Path, message: str) -> None:
+        self.problems.append(Problem(self.layout.relative(path), message, self.split, self.scene))
+
+    def _failed(self, error: ValueError) -> None:
+        """Note what a reader said; its sentence begins with the file's whole path."""
+        place, _, message = str(error).removeprefix(f"{self.layout.root}/").partition(": ")
+        self.problems.append(Problem(place, message, self.split, self.scene))
+
+    def _check_head(self, path: Path, manifest: SceneManifest) -> None:
+        if (manifest.split, manifest.scene) != (self.split, self.scene):
+            self._found(path, f"is the manifest of {manifest.split} scene {manifest.scene}")
+        if manifest.recipe_sha256 != self.recipe.settings_sha256():
+            self._found(path, "was rendered with other settings than the recipe's")
+
+    def _is_whole(self, entry: FileEntry) -> bool:
+        """Compare one file with its manifest entry."""
+        size, problem = compare(self.layout, entry)
+        self.files += 1
+        self.bytes_read += size
+        if problem:
+            self._found(self.layout.root / entry.path, problem)
+        return problem is None
+
+    def _are_readable(self, paths: list[Path]) -> bool:
+        """Whether files that the scene must have are whole; one the manifest does not list is a problem."""
+        names = [self.layout.relative(path) for path in paths]
+        for path, name in zip(paths, names, strict=True):
+            if name not in self.known:
+                self._found(path, "is part of the scene but not in its manifest")
+        return self._whole.issuperset(names)
+
+    def _check_contents(self, scene: Scene, caster: SceneRayCaster | None) -> None:
+        camera_data = self.layout.file("camera_data", self.split, self.scene)
+        if self._are_readable([camera_data]):
+            self._check_camera_data(camera_data, scene)
+        for instant in range(scene.frames):
+            self.frames += 1
+            if self._are_readable(self._frame_files(FIRST_FRAME + instant)):
+                self._check_frame(scene, caster, FIRST_FRAME + instant)
+
+    def _frame_files(self, frame: int) -> list[Path]:
+        kinds = [RENDER_PASSES[name] for name in self.recipe.passes]
+        kinds += [kind for kind in (*TARGETS, *self.recipe.targets) if KINDS[kind].per_eye]
+        return [
+            self.layout.file(kind, self.split, self.scene, eye, frame, direction)
+            for kind in kinds
+            for eye in EYES
+            for direction in KINDS[kind].directions
+        ]
+
+    def _check_frame(self, scene: Scene, caster: SceneRayCaster | None, frame: int) -> None:
+        samples = tuple(
+            StereoSample(self.layout, self.split, self.scene, frame, name) for name in self.recipe.passes
+        )
+        try:
+            for path, message in FrameCheck(
+                samples, self.recipe, scene, caster, self.sampled_pixels
+            ).problems():
+                self._found(path, message)
+        except DatasetError as error:
+            self._failed(error)
+
+    def _check_camera_data(self, path: Path, scene: Scene) -> None:
+        """The poses on disk are those of the scene's camera."""
+        try:
+            poses = read_camera_data(path)
+        except DatasetError as error:
+            self._failed(error)
+            return
+        camera = scene.camera
+        expected = {FIRST_FRAME + k: [camera.pose(eye, k) for eye in EYES] for k in range(scene.frames)}
+        if poses.keys() != expected.keys():
+            self._found(path, f"has the frames {sorted(poses)} where the scene has {sorted(expected)}")
+            return
+        for frame, matrices in poses.items():
+            if not np.allclose(matrices, expected[frame], rtol=0, atol=POSE_TOLERANCE):
+                self._found(path, f"the poses of frame {frame} are not those of the scene's camera")

@@ -1,0 +1,1 @@
+"""Scores of methods on frames: pooling, intervals, tuning, and the evaluation kept on disk."""

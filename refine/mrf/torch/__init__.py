@@ -1,0 +1,1 @@
+"""The MRF as a differentiable torch function, for batches."""

@@ -1,0 +1,217 @@
+"""What things in landscapes are made of: textures of a stuff in colours of that stuff."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from scenes.appearance.painting import Palette
+from scenes.appearance.palettes import (
+    BARK,
+    CLOTH,
+    DRY_GRASS,
+    EARTH,
+    FOLIAGE,
+    HAIR,
+    MOSS,
+    PLASTER,
+    RED_ROCK,
+    ROCK,
+    SAND,
+    SKIN,
+    SNOW,
+    TILES,
+    VIVID,
+    Tones,
+    sample_tones,
+)
+from scenes.random_draws import choose, integer, uniform
+from scenes.spec import Texture
+from scenes.textures.cells import Cobblestones, VoronoiCells
+from scenes.textures.marks import DeadLeaves
+from scenes.textures.natural import Hair, Iris, LeafVeins, Litter, RoughBark, Strata
+from scenes.textures.noise import FractalNoise, Labyrinth, WoodPlanks
+from scenes.textures.plain import Gradient
+from scenes.textures.tiles import Bricks, Dots, Stripes, Weave
+
+Stuff = Callable[[np.random.Generator, int], Texture]
+"""Draws a texture of `size` pixels."""
+
+
+def leaves(tones: Tones = FOLIAGE) -> Stuff:
+    def draw(rng: np.random.Generator, size: int) -> Texture:
+        palette = sample_tones(rng, tones, 4)
+        if rng.random() < 0.6:
+            return LeafVeins.of(rng, size, palette[:3], palette[3])
+        return _noise(rng, size, palette)
+
+    return draw
+
+
+def ground(tones: Tones, under: Tones = EARTH) -> Stuff:
+    """Grass, litter, moss or snow over soil: strokes or clouds."""
+
+    def draw(rng: np.random.Generator, size: int) -> Texture:
+        palette = (sample_tones(rng, under, 2)[0], *sample_tones(rng, tones, 4))
+        return Litter.of(rng, size, palette) if rng.random() < 0.65 else _noise(rng, size, palette)
+
+    return draw
+
+
+def grains(tones: Tones) -> Stuff:
+    """Sand, snow, dust: soft clouds and grit of one tone."""
+
+    def draw(rng: np.random.Generator, size: int) -> Texture:
+        noise = FractalNoise.sample(rng, size)
+        return replace(noise, palette=sample_tones(rng, tones, 4), slope=uniform(rng, 0.5, 1.0), ridges=False)
+
+    return draw
+
+
+def rock(tones: Tones = ROCK, dust: Tones = MOSS) -> Stuff:
+    def draw(rng: np.random.Generator, size: int) -> Texture:
+        return Strata.of(rng, size, sample_tones(rng, tones, 4), sample_tones(rng, dust, 1)[0])
+
+    return draw
+
+
+def masonry(tones: Tones) -> Stuff:
+    """Dressed stone: blocks, rubble or plain weathered stone."""
+
+    def draw(rng: np.random.Generator, size: int) -> Texture:
+        palette = sample_tones(rng, tones, 4)
+        kind = rng.random()
+        if kind < 0.35:
+            return replace(Bricks.sample(rng, size), palette=palette[1:], mortar=palette[0])
+        if kind < 0.5:
+            return replace(Cobblestones.sample(rng, size), palette=palette)
+        return rock(tones)(rng, size)
+
+    return draw
+
+
+def paving(rng: np.random.Generator, size: int) -> Texture:
+    """Cobbles, flagstones or trodden earth."""
+    palette = sample_tones(rng, choose(rng, (ROCK, EARTH, SAND)), 4)
+    kind = rng.random()
+    if kind < 0.5:
+        return replace(Cobblestones.sample(rng, size), palette=palette, cells=integer(rng, 10, 24))
+    if kind < 0.75:
+        return replace(VoronoiCells.sample(rng, size), palette=palette[1:], joint=palette[0])
+    return _noise(rng, size, palette)
+
+
+def plaster(rng: np.random.Generator, size: int) -> Texture:
+    palette = sample_tones(rng, PLASTER, 4)
+    return _noise(rng, size, palette) if rng.random() < 0.6 else Strata.of(rng, size, palette, palette[0])
+
+
+def roofing(rng: np.random.Generator, size: int) -> Texture:
+    palette = sample_tones(rng, TILES, 4)
+    if rng.random() < 0.7:
+        return replace(Bricks.sample(rng, size), palette=palette[1:], mortar=palette[0])
+    return Hair.of(rng, size, sample_tones(rng, DRY_GRASS, 4), palette[0])
+
+
+def bark(rng: np.random.Generator, size: int) -> Texture:
+    return RoughBark.of(rng, size, sample_tones(rng, BARK, 4), sample_tones(rng, MOSS, 2)[1])
+
+
+def culm(rng: np.random.Generator, size: int) -> Texture:
+    palette = sample_tones(rng, replace(FOLIAGE, hue_deg=(90.0, 130.0)), 4)
+    return RoughBark.of(rng, size, palette, sample_tones(rng, DRY_GRASS, 2)[1])
+
+
+def timber(rng: np.random.Generator, size: int) -> Texture:
+    return replace(WoodPlanks.sample(rng, size), palette=sample_tones(rng, BARK, 2))
+
+
+def fur(rng: np.random.Generator, size: int) -> Texture:
+    """Half of them the colours of real animals, half of none."""
+    tones = choose(rng, (HAIR, VIVID))
+    palette, marking = sample_tones(rng, tones, 4), sample_tones(rng, choose(rng, (HAIR, VIVID)), 2)[1]
+    if rng.random() < 0.7:
+        return Hair.of(rng, size, palette, marking)
+    return replace(Labyrinth.sample(rng, size), palette=(*palette[1:3], marking))
+
+
+def hide(rng: np.random.Generator, size: int) -> Texture:
+    """Bare skin of creatures: scales, spots, blotches."""
+    palette = sample_tones(rng, choose(rng, (VIVID, VIVID, EARTH)), 4)
+    kind = integer(rng, 0, 3)
+    if kind == 0:
+        return replace(Labyrinth.sample(rng, size), palette=palette[:3])
+    if kind == 1:
+        return replace(VoronoiCells.sample(rng, size), palette=palette[1:], joint=palette[0])
+    if kind == 2:
+        return replace(DeadLeaves.sample(rng, size), palette=palette, corners=0)
+    return _noise(rng, size, palette)
+
+
+def skin(rng: np.random.Generator, size: int) -> Texture:
+    return _noise(rng, size, sample_tones(rng, SKIN, 3), low_cycles=6.0)
+
+
+def hair(rng: np.random.Generator, size: int) -> Texture:
+    palette = sample_tones(rng, HAIR, 3)
+    return replace(Hair.of(rng, size, palette, palette[0]), pattern="none")
+
+
+def leather(rng: np.random.Generator, size: int) -> Texture:
+    return _noise(rng, size, sample_tones(rng, BARK, 3), low_cycles=8.0)
+
+
+def cloth(rng: np.random.Generator, size: int) -> Texture:
+    """Woven, striped, spotted or plain stuff of one hue."""
+    palette = sample_tones(rng, CLOTH, 3, hue_spread_deg=40.0)
+    kind = choose(rng, (Weave, Stripes, Dots, Gradient, Labyrinth, None), (0.3, 0.15, 0.1, 0.1, 0.1, 0.25))
+    if kind is None:
+        return _noise(rng, size, palette, low_cycles=4.0)
+    return _recolored(kind.sample(rng, size), palette)
+
+
+def cap(rng: np.random.Generator, size: int) -> Texture:
+    """The skin of mushrooms."""
+    palette = sample_tones(rng, choose(rng, (VIVID, VIVID, EARTH)), 3, hue_spread_deg=40.0)
+    kind = choose(rng, (Dots, Labyrinth, Gradient, None), (0.3, 0.25, 0.2, 0.25))
+    if kind is None:
+        return _noise(rng, size, palette)
+    return _recolored(kind.sample(rng, size), palette)
+
+
+def eye(rng: np.random.Generator, size: int) -> Texture:
+    return Iris.sample(rng, size)
+
+
+def horn(rng: np.random.Generator, size: int) -> Texture:
+    return RoughBark.of(rng, size, sample_tones(rng, PLASTER, 3), sample_tones(rng, EARTH, 1)[0])
+
+
+SNOWY = rock(ROCK, SNOW)
+DESERT_ROCK = rock(RED_ROCK, SAND)
+BY_NAME: dict[str, Stuff] = {
+    "fur": fur,
+    "hide": hide,
+    "skin": skin,
+    "hair": hair,
+    "cloth": cloth,
+    "leather": leather,
+    "wood": timber,
+    "horn": horn,
+    "eye": eye,
+}
+"""What figures are made of."""
+
+
+def _noise(rng: np.random.Generator, size: int, palette: Palette, low_cycles: float = 3.0) -> Texture:
+    noise = FractalNoise.sample(rng, size)
+    return replace(noise, palette=palette, low_cycles=low_cycles * uniform(rng, 0.7, 1.5))
+
+
+def _recolored(texture: Texture, palette: Palette) -> Texture:
+    """The same pattern in other colours, as many as it had."""
+    had = len(texture.palette)  # type: ignore[attr-defined]
+    colors = tuple(palette[k % len(palette)] for k in range(had))
+    return replace(texture, palette=colors)  # type: ignore[call-arg]

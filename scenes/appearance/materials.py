@@ -1,0 +1,64 @@
+"""Random materials: which picture a surface wears, how finely, and how it answers light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenes.random_draws import Range, choose, log_uniform, uniform
+from scenes.spec import Material, Texture
+from scenes.textures import TEXTURES
+
+
+@dataclass(frozen=True)
+class Finish:
+    """A kind of surface: ranges of the principled BSDF's scalars."""
+
+    share: float
+    """How many of all materials are of this kind, relative to the others."""
+    roughness: Range = (1.0, 1.0)
+    specular: Range = (0.0, 0.0)
+    metallic: Range = (0.0, 0.0)
+    transmission: Range = (0.0, 0.0)
+    emission: Range = (0.0, 0.0)
+
+
+FINISHES: dict[str, Finish] = {
+    "matte": Finish(share=0.60),
+    "satin": Finish(share=0.15, roughness=(0.35, 0.7), specular=(0.3, 0.5)),
+    "glossy": Finish(share=0.10, roughness=(0.05, 0.25), specular=(0.5, 0.8)),
+    "brushed metal": Finish(share=0.06, roughness=(0.3, 0.55), metallic=(0.8, 1.0)),
+    "polished metal": Finish(share=0.03, roughness=(0.05, 0.2), metallic=(1.0, 1.0)),
+    "glass": Finish(share=0.03, roughness=(0.0, 0.15), specular=(0.5, 0.5), transmission=(0.5, 0.9)),
+    "glowing": Finish(share=0.03, emission=(0.2, 1.5)),
+}
+"""Mostly diffuse, which is cheap to render; every other kind a network will meet, in smaller numbers."""
+
+TEXEL_PX: Range = (0.9, 2.2)
+"""Image pixels that one texture pixel covers where the surface is seen: below 1 detail aliases, far above
+it smears."""
+
+
+def sample_texture(rng: np.random.Generator, size: int) -> Texture:
+    """A random texture of any kind, by the kinds' popularity."""
+    kinds = [TEXTURES[name] for name in sorted(TEXTURES)]
+    return choose(rng, kinds, [kind.popularity for kind in kinds]).sample(rng, size)
+
+
+def sample_material(rng: np.random.Generator, unit_px: float, texture_size: int = 256) -> Material:
+    """A random material for a surface on which one unit of texture coordinates spans `unit_px` pixels.
+
+    The texture is repeated so that its pixels and the image's are of about the same size (`TEXEL_PX`).
+    """
+    finish = choose(rng, list(FINISHES.values()), [finish.share for finish in FINISHES.values()])
+    texel_px = log_uniform(rng, *TEXEL_PX)
+    return Material(
+        color=sample_texture(rng, texture_size),
+        repeats=unit_px / (texture_size * texel_px),
+        roughness=uniform(rng, *finish.roughness),
+        specular=uniform(rng, *finish.specular),
+        metallic=uniform(rng, *finish.metallic),
+        transmission=uniform(rng, *finish.transmission),
+        emission=uniform(rng, *finish.emission),
+    )

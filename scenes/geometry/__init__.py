@@ -1,0 +1,1 @@
+"""Triangle meshes and how they are built: solids, implicit surfaces, stems and leaves."""

@@ -1,0 +1,49 @@
+"""Stems and the leaves about them: what plants of all kinds are made of."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.geometry.building import Vertices, tube
+from scenes.geometry.leaves import arched, horizontal_side, strips
+from scenes.shapes.anchored import Part
+
+UP = np.array((0.0, 0.0, 1.0))
+
+
+def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    scaled: NDArray[np.float64] = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return scaled
+
+
+def stem(path: Vertices, radius: NDArray[np.float64], sides: int = 7) -> Part:
+    vertices, triangles, _ = tube(path, radius, sides)
+    return vertices, triangles
+
+
+def winding_path(
+    rng: np.random.Generator, start: Vertices, end: Vertices, wobble: float, points: int
+) -> Vertices:
+    """(points, 3) from start to end, straying sideways by about `wobble`, not at all at the start."""
+    share = np.linspace(0.0, 1.0, points)
+    waves = np.zeros((points, 3))
+    for k in range(3):
+        waves += np.outer(np.sin(np.pi * share * (k + 0.5)), rng.normal(0.0, 1.0 / (k + 1), 3))
+    path: Vertices = start + np.outer(share, end - start) + wobble * waves * (1.0, 1.0, 0.3)
+    return path
+
+
+def leaf_cloud(
+    rng: np.random.Generator, centres: Vertices, radius: NDArray[np.float64], leaves: int, size: float
+) -> Part:
+    """Pointed leaves on the outside of balls, hanging outward: the crowns of bushes and trees."""
+    owner = rng.integers(0, len(centres), leaves)
+    outward = unit(rng.normal(size=(leaves, 3)) + 0.25 * UP)
+    base = centres[owner] + outward * (radius[owner] * rng.uniform(0.55, 1.0, leaves))[:, None]
+    direction = unit(outward + rng.normal(0.0, 0.5, (leaves, 3)) - 0.35 * UP)
+    length = size * rng.uniform(0.7, 1.3, leaves)
+    paths = arched(base, direction, length, rng.uniform(0.0, 0.3, leaves), 3)
+    side = horizontal_side(direction, rng)
+    tilt = unit(side + rng.normal(0.0, 0.35, (leaves, 3)))
+    return strips(paths, tilt, (0.34 * length)[:, None])

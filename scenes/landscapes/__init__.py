@@ -1,0 +1,1 @@
+"""What families of landscapes share: terrain, vegetation, characters, people."""

@@ -1,0 +1,199 @@
+"""Land, and a stereo rig that looks over it at something: what families of landscapes start from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from scenes.family import FamilyConfig
+from scenes.motion.trajectories import KEY_SPACING_FRAMES, exposure_times, vector, wander
+from scenes.random_draws import Range, chance, log_uniform, uniform
+from scenes.shapes.nature.landforms import Landscape
+from scenes.spec import Color, FinalPass, Fog, StereoCamera
+
+NEAREST_SHARE = 0.105
+"""Disparity of the nearest surface allowed, as a share of the image width: 101 px at 960."""
+
+
+@dataclass(frozen=True)
+class LandscapeConfig(FamilyConfig):
+    """What families of landscapes have in common: a camera that looks at a figure on open land."""
+
+    focal_mm: Range = (22.0, 45.0)
+    """Focal length on a sensor 32 mm wide."""
+    focus_disparity_share: Range = (0.016, 0.045)
+    """Disparity of the figure the scene is about, as a share of the image width (0.016 is 15 px at 960);
+    it sets the baseline."""
+    focus_height_share: Range = (0.45, 0.8)
+    """Height of that figure, as a share of the image height."""
+    camera_speed: Range = (0.0, 0.015)
+    """Speed of the camera, as a share of the figure's distance per frame."""
+    camera_turn_deg: Range = (0.0, 0.5)
+    """How fast the camera turns, degrees per frame."""
+    sky_strength: Range = (0.7, 1.6)
+    """Brightness of the sky's light."""
+    fog_share: float = 0.4
+    """Share of the scenes with fog in the final pass, 0..1."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("focal_mm", "focus_disparity_share", "focus_height_share"):
+            if getattr(self, name)[0] <= 0:
+                raise ValueError(f"{name} must be above 0, got {getattr(self, name)}")
+        if self.focus_disparity_share[1] > NEAREST_SHARE / 2:
+            raise ValueError(f"focus_disparity_share must not exceed {NEAREST_SHARE / 2}")
+
+
+@dataclass(frozen=True)
+class Land:
+    """The ground and how large it is; its middle is the world's origin."""
+
+    shape: Landscape
+    half_m: float
+    """Half its side."""
+
+    @cached_property
+    def _heights_m(self) -> NDArray[np.float64]:
+        return self.shape.heights() * self.half_m
+
+    def height_m(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """World z of the ground's triangles at (N, 2) world points; the rim's height beyond the rim."""
+        line = self.shape.line()
+        x, y = np.clip(points_m / self.half_m, -1.0, 1.0).T
+        column = np.clip(np.searchsorted(line, x, side="right") - 1, 0, len(line) - 2)
+        row = np.clip(np.searchsorted(line, y, side="right") - 1, 0, len(line) - 2)
+        u = (x - line[column]) / (line[column + 1] - line[column])
+        v = (y - line[row]) / (line[row + 1] - line[row])
+        grid = self._heights_m
+        a, b = grid[row, column], grid[row, column + 1]
+        d, e = grid[row + 1, column], grid[row + 1, column + 1]
+        # Each cell is two triangles that share the diagonal from (0, 0) to (1, 1).
+        height: NDArray[np.float64] = np.where(
+            u >= v, a + u * (b - a) + v * (e - b), a + v * (d - a) + u * (e - d)
+        )
+        return height
+
+    def rest_m(self) -> float:
+        """World z of the mesh's origin."""
+        return -self.shape.middle_height() * self.half_m
+
+
+@dataclass(frozen=True)
+class Focus:
+    """What the scene is about, and how the camera sees it."""
+
+    depth_m: float
+    """Distance along the optical axis."""
+    size_m: float
+    """Its height."""
+    disparity_share: float
+    """Its disparity as a share of the image width."""
+    eye_height_m: float
+    above_deg: float
+    """How far above its middle the camera looks."""
+    focal_mm: float
+    speed_m: float
+    """Of the camera, a frame."""
+    turn_deg: float
+    """Of the camera, a frame."""
+
+    @property
+    def nearest_m(self) -> float:
+        """Depth at which the disparity would be the largest allowed."""
+        return self.depth_m * self.disparity_share / NEAREST_SHARE
+
+
+def sample_camera(
+    rng: np.random.Generator, width: int, height: int, frames: int, land: Land, focus: Focus
+) -> StereoCamera:
+    """A rig over the origin that looks along +y at the middle of the focus, on a smooth path.
+
+    Its baseline is such that the focus has its disparity; none of its path comes near the ground.
+    """
+    focal_px = focus.focal_mm / 32.0 * width
+    baseline_m = focus.disparity_share * width * focus.depth_m / focal_px
+    reach_m = min(focus.speed_m * KEY_SPACING_FRAMES / 2, 0.12 * focus.depth_m)
+    angle = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle)], -1)
+    around = np.concatenate([circle * share for share in (0.0, 0.5, 1.0)]) * (reach_m + baseline_m)
+    above_m = max(focus.eye_height_m, reach_m + 0.4 * focus.eye_height_m)
+    eye_m = float(land.height_m(around).max()) + above_m
+    target_m = float(land.height_m(np.array([[0.0, focus.depth_m]]))[0]) + 0.5 * focus.size_m
+    pitch_deg = math.degrees(math.atan2(eye_m - target_m, focus.depth_m)) - focus.above_deg
+    motion = wander(
+        rng,
+        frames,
+        np.array((-baseline_m / 2, 0.0, eye_m)),
+        Rotation.from_euler("XZ", (90.0 - pitch_deg, uniform(rng, -2.0, 2.0)), degrees=True),
+        speed_m=focus.speed_m,
+        turn_deg=focus.turn_deg,
+        reach_m=reach_m,
+        reach_deg=3.0,
+    )
+    return StereoCamera(width, height, focus.focal_mm, baseline_m, motion)
+
+
+def eye_positions(camera: StereoCamera, frames: int) -> NDArray[np.float64]:
+    """(N, 3) where both eyes are while the scene lasts."""
+    return np.array(
+        [camera.pose(eye, time)[:3, 3] for time in exposure_times(frames) for eye in ("left", "right")]
+    )
+
+
+def half_height(focal_mm: float, config: FamilyConfig) -> float:
+    """Tangent of half the vertical field of view."""
+    return 16.0 / focal_mm * config.height / config.width
+
+
+def sample_focus(
+    rng: np.random.Generator,
+    config: LandscapeConfig,
+    focal_mm: float,
+    depth_m: float,
+    size_m: float,
+    eye_height_m: float,
+) -> Focus:
+    """Look at a figure of a size and at a distance from about a height, the figure about mid-image.
+
+    The eye is raised where the image's lower edge would otherwise show ground nearer than allowed.
+    """
+    share = uniform(rng, *config.focus_disparity_share)
+    half_high = half_height(focal_mm, config)
+    height_m = max(eye_height_m, 1.3 * (half_high + 0.1) * depth_m * share / NEAREST_SHARE)
+    return Focus(
+        depth_m=depth_m,
+        size_m=size_m,
+        disparity_share=share,
+        eye_height_m=height_m,
+        above_deg=uniform(rng, -0.05, 0.3) * math.degrees(half_high),
+        focal_mm=focal_mm,
+        speed_m=uniform(rng, *config.camera_speed) * depth_m,
+        turn_deg=uniform(rng, *config.camera_turn_deg),
+    )
+
+
+def linear(srgb: tuple[int, int, int]) -> Color:
+    """An 8-bit sRGB colour as linear light (IEC 61966-2-1, by its approximate exponent)."""
+    red, green, blue = (round((value / 255) ** 2.2, 4) for value in srgb)
+    return (red, green, blue)
+
+
+def sample_final(
+    rng: np.random.Generator, focus_m: float, haze: Color, fog_share: float, visibility_m: Range
+) -> FinalPass:
+    """A final pass focused on what the scene is about, foggy in `fog_share` of the cases."""
+    return FinalPass(
+        shutter_frames=uniform(rng, 0.3, 0.6),
+        f_number=log_uniform(rng, 1.8, 11.0),
+        focus_m=focus_m,
+        fog=Fog(haze, log_uniform(rng, *visibility_m)) if chance(rng, fog_share) else None,
+        noise=uniform(rng, 0.0, 0.02),
+        vignetting=uniform(rng, 0.0, 0.3),
+        exposure_difference_ev=float(rng.normal(0.0, 0.08)),
+        right_eye_color=vector(np.exp(rng.normal(0.0, 0.015, 3))),
+    )

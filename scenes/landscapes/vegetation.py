@@ -1,0 +1,185 @@
+"""Growth and stones on a stage: trees, thickets, undergrowth, grass, mushrooms, boulders.
+
+A few shapes and a few materials of each kind, standing in many places. Lengths are given by `unit_m`, the
+distance of what the scene is about.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from scenes.appearance.material_textures import Stuff, bark, cap, horn, leaves
+from scenes.appearance.palettes import FOLIAGE, Tones
+from scenes.placement.stage import Spot, Stage
+from scenes.random_draws import Range, choose, log_uniform, uniform
+from scenes.shapes.anchored import Standing
+from scenes.shapes.nature.landforms import Boulder
+from scenes.shapes.nature.plants import GrassTuft, Mushroom, sample_undergrowth
+from scenes.spec import Shape
+
+T = TypeVar("T")
+
+Holds = Callable[[Spot], bool]
+
+
+def anywhere(_: Spot) -> bool:
+    return True
+
+
+@dataclass(frozen=True)
+class Garden:
+    """Where things grow."""
+
+    stage: Stage
+    unit_m: float
+    holds: Holds = anywhere
+    """Which spots are to be planted."""
+
+    def spots(self, rng: np.random.Generator, count: int, depths: Range, spread: float) -> list[Spot]:
+        """Up to `count` random spots at depths in units."""
+        near, far = depths
+        drawn = [
+            self.stage.scatter(rng, (near * self.unit_m, far * self.unit_m), spread) for _ in range(count)
+        ]
+        return [spot for spot in drawn if self.holds(spot)]
+
+
+STILL_BEYOND = 2.2
+"""Plants farther away than this many units do not sway: too little to see, and they can share their meshes."""
+
+
+def _outfits(rng: np.random.Generator, kinds: Sequence[T], materials: Sequence[int]) -> list[tuple[T, int]]:
+    """Each kind and each material at least once, in few pairs: things alike in both are one mesh."""
+    count = max(len(kinds), len(materials)) + 2
+    order = rng.permutation(count)
+    return [(kinds[k % len(kinds)], materials[int(order[k]) % len(materials)]) for k in range(count)]
+
+
+def trees(
+    rng: np.random.Generator,
+    garden: Garden,
+    kinds: Sequence[Standing],
+    count: int,
+    depths: Range,
+    scales: Range,
+    foliage: Sequence[Stuff],
+    trunk: Stuff = bark,
+) -> None:
+    """Trees of a few kinds; wood and leaves wear their own stuffs."""
+    stage, unit_m = garden.stage, garden.unit_m
+    seen_m = 1.6 * depths[0] * unit_m
+    wood = [stage.wear(rng, trunk, unit_m, seen_m) for _ in range(2)]
+    green = [stage.wear(rng, stuff, unit_m, seen_m) for stuff in foliage]
+    outfits = [(kind, leaf, choose(rng, wood)) for kind, leaf in _outfits(rng, kinds, green)]
+    for index, spot in enumerate(garden.spots(rng, count, depths, 1.2)):
+        kind, leaf, stem = choose(rng, outfits)
+        worn = {"wood": stem, "leaves": leaf}
+        stage.stand_in_parts(f"tree {index}", kind, worn, spot, log_uniform(rng, *scales) * unit_m)
+
+
+def plants(
+    rng: np.random.Generator,
+    garden: Garden,
+    name: str,
+    kinds: Sequence[Shape],
+    count: int,
+    depths: Range,
+    scales: Range,
+    foliage: Sequence[Stuff],
+    *,
+    sway: Range = (0.01, 0.06),
+    sunk: float = 0.02,
+    spread: float = 1.2,
+) -> None:
+    """Swaying plants of a few kinds; `sunk` is how deep they stand, relative to their scale."""
+    stage, unit_m = garden.stage, garden.unit_m
+    middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
+    green = [stage.wear(rng, stuff, middle_m, 1.4 * depths[0] * unit_m) for stuff in foliage]
+    outfits = _outfits(rng, kinds, green)
+    for index, spot in enumerate(garden.spots(rng, count, depths, spread)):
+        (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
+        moves = spot.depth_m < STILL_BEYOND * unit_m
+        motion = stage.swaying(rng, shape, uniform(rng, *sway)) if moves else None
+        stage.stand(
+            f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk * scale_m, deformation=motion
+        )
+
+
+def undergrowth(
+    rng: np.random.Generator,
+    garden: Garden,
+    count: int,
+    foliage: Sequence[Stuff],
+    scales: Range = (0.12, 0.4),
+) -> None:
+    """Ferns, broad leaves and bushes; the first six close before the camera, at the image's sides."""
+    kinds = [sample_undergrowth(rng) for _ in range(7)]
+    low, high = scales
+    plants(rng, garden, "near plant", kinds[:3], 6, (0.5, 0.9), (0.6 * low, 0.6 * high), foliage[:2])
+    plants(rng, garden, "plant", kinds, count, (0.8, 6.0), scales, foliage)
+
+
+def grass(
+    rng: np.random.Generator,
+    garden: Garden,
+    count: int,
+    tones: Sequence[Tones] = (FOLIAGE,),
+    scales: Range = (0.06, 0.2),
+) -> None:
+    kinds = [GrassTuft.sample(rng) for _ in range(4)]
+    foliage = [leaves(kind) for kind in tones]
+    plants(
+        rng,
+        garden,
+        "grass",
+        kinds,
+        count,
+        (0.6, 3.5),
+        scales,
+        foliage,
+        sway=(0.02, 0.1),
+        sunk=0.0,
+        spread=1.1,
+    )
+
+
+def mushrooms(
+    rng: np.random.Generator, garden: Garden, name: str, count: int, depths: Range, scales: Range, glow: float
+) -> None:
+    stage, unit_m = garden.stage, garden.unit_m
+    kinds = [Mushroom.sample(rng) for _ in range(5)]
+    middle_m, seen_m = math.sqrt(scales[0] * scales[1]) * unit_m, 1.5 * depths[0] * unit_m
+    pale = stage.wear(rng, horn, middle_m, seen_m)
+    caps = [stage.wear(rng, cap, middle_m, seen_m, emission=glow) for _ in range(3)]
+    outfits = _outfits(rng, kinds, caps)
+    for index, spot in enumerate(garden.spots(rng, count, depths, 1.1)):
+        kind, top = choose(rng, outfits)
+        worn = {"stem": pale, "cap": top}
+        stage.stand_in_parts(f"{name} {index}", kind, worn, spot, log_uniform(rng, *scales) * unit_m)
+
+
+def boulders(
+    rng: np.random.Generator,
+    garden: Garden,
+    name: str,
+    count: int,
+    stones: Sequence[Stuff],
+    depths: Range = (0.7, 8.0),
+    scales: Range = (0.04, 0.35),
+    sunk: Range = (0.2, 0.6),
+) -> None:
+    """Stones sunk into the ground, by `sunk` relative to their scale."""
+    stage, unit_m = garden.stage, garden.unit_m
+    kinds = [replace(Boulder.sample(rng), detail=3) for _ in range(4)]
+    middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
+    worn = [stage.wear(rng, stuff, middle_m, 1.8 * depths[0] * unit_m) for stuff in stones]
+    outfits = _outfits(rng, kinds, worn)
+    for index, spot in enumerate(garden.spots(rng, count, depths, 1.15)):
+        (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
+        sunk_m = scale_m * uniform(rng, *sunk)
+        stage.stand(f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk_m)

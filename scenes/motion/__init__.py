@@ -1,0 +1,1 @@
+"""How things move: trajectories of rigid bodies, and deformations."""

@@ -1,0 +1,1 @@
+"""Putting things on the ground, in view, and out of the camera's way."""

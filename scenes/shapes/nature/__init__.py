@@ -1,0 +1,1 @@
+"""Shapes of landscapes: land, plants, trees, masonry, creatures."""

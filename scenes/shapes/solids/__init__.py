@@ -1,0 +1,1 @@
+"""Shapes without a size or a place of their own: solids, sheets, wires."""

@@ -1,0 +1,1 @@
+"""Shapes of streets, in metres: buildings, vehicles, furniture, people."""

@@ -1,0 +1,1 @@
+"""The user's own meshes, textures and environments."""

@@ -1,0 +1,1 @@
+"""The pipelines that join rendering, training and refinement."""

@@ -1,0 +1,262 @@
+"""From a pair of pictures to what the refinement and the evaluation take in."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen import StereoSample
+from datagen.sources.stereo_frame import StereoFrame
+from refine.evaluation.evaluate import EvaluationFrame
+from refine.evaluation.settings import Settings, read_settings
+from refine.forest import Forest, load_forest
+from refine.heuristic_inputs import consistency_confidence, local_slopes
+from refine.methods.base import Method
+from stereoforge.errors import CommandError
+from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
+from training.prediction.predictor import FreePredictor, Prediction, StereoPredictor
+from training.runs.weights import has_weights, weights_path
+
+PredictorName = Literal["networks", "sgbm"]
+
+Image = NDArray[np.uint8]
+Map = NDArray[np.float32]
+
+
+class PairPredictor(Protocol):
+    """Anything that gives a disparity for a pair, and what else it knows."""
+
+    def predict(self, left: Image, right: Image) -> Prediction: ...
+
+
+@dataclass(frozen=True)
+class MatchingPredictor:
+    """Semi-global matching, or a given disparity, with the networks that need no regressor, or without them."""
+
+    networks: FreePredictor
+    matcher: SGBMParameters
+
+    def predict(self, left: Image, right: Image) -> Prediction:
+        """Match the pair, and judge the match."""
+        return self.judge(left, right, *match_both(left, right, self.matcher))
+
+    def predict_for(
+        self, left: Image, right: Image, disparity: Map, disparity_right: Map | None
+    ) -> Prediction:
+        """Judge a given disparity (H, W), NaN in holes; the right view's is matched where it is not given."""
+        if disparity_right is None:
+            reach = max(self.matcher.max_disparity_px, math.ceil(float(np.nanmax(disparity))) + 16)
+            matcher = replace(self.matcher, max_disparity_px=min(reach, left.shape[1]))
+            disparity_right = match_both(left, right, matcher)[1]
+        return self.judge(left, right, disparity, disparity_right)
+
+    def judge(self, left: Image, right: Image, disparity: Map, disparity_right: Map) -> Prediction:
+        """Confidence and gradients by the networks there are, else by hand; holes are filled from the background."""
+        judged = self.networks.predict(left, right, disparity, disparity_right)
+        confidence, gradient = judged.confidence, judged.gradient
+        if confidence is None:
+            consistency = left_right_consistency(disparity, disparity_right)
+            confidence = consistency_confidence(disparity, consistency, left)
+        if gradient is None:
+            gradient = local_slopes(disparity, confidence, left)
+        return Prediction(fill_background(disparity), confidence, gradient)
+
+
+@dataclass(frozen=True)
+class Predictors:
+    """Everything that says something about a pair."""
+
+    initial: PairPredictor
+    """Gives the disparity that is refined."""
+    fine_tuned: StereoPredictor | None
+    """The regressor fine-tuned on gradients, where there is one."""
+    forest: Forest | None = None
+    """The random forest on the initial disparity, where there is one."""
+
+    def frame(self, sample: StereoFrame) -> EvaluationFrame:
+        """One sample with all that is predicted for it, and how long that took.
+
+        Where nobody knows what is occluded, nothing is taken to be. Object maps are KITTI's, cars told from the
+        rest; those of our own sets number everything. Frames of one folder are of one scene.
+        """
+        occlusion = sample.occlusion_left
+        objects = None if isinstance(sample, StereoSample) else sample.object_index_left
+        began = time.perf_counter()
+        prediction = self.initial.predict(sample.left, sample.right)
+        seconds = {"disparity": time.perf_counter() - began}
+        fine_tuned = None
+        if self.fine_tuned is not None:
+            began = time.perf_counter()
+            fine_tuned = self.fine_tuned.predict(sample.left, sample.right).disparity
+            seconds["fine_tuned"] = time.perf_counter() - began
+        return EvaluationFrame(
+            name=sample.name,
+            image=sample.left,
+            truth=sample.disparity_left,
+            occlusion=np.zeros(sample.size, np.uint8) if occlusion is None else occlusion,
+            disparity=prediction.disparity,
+            confidence=prediction.confidence,
+            gradient=prediction.gradient,
+            right=sample.right,
+            fine_tuned=fine_tuned,
+            objects=objects,
+            scene=sample.name.rpartition("/")[0],
+            other_confidences={}
+            if self.forest is None
+            else {"rdf": self._forest_confidence(sample, prediction)},
+            seconds=seconds,
+        )
+
+    def _forest_confidence(self, sample: StereoFrame, prediction: Prediction) -> Map:
+        assert self.forest is not None
+        assert isinstance(self.initial, StereoPredictor)
+        consistency = left_right_consistency(
+            prediction.disparity, self.initial.predict_right(sample.left, sample.right)
+        )
+        return self.forest.confidence(prediction.disparity, consistency, sample.left)
+
+
+def open_predictors(run: Path, device: str = "cpu", predictor: PredictorName = "networks") -> Predictors:
+    """What a run folder holds; raises TrainingError, naming what is wrong."""
+    if predictor == "sgbm":
+        return Predictors(open_matching(run, device), None)
+    return Predictors(
+        initial=StereoPredictor(run, device),
+        fine_tuned=StereoPredictor(run, device, "regressor_f") if has_weights(run, "regressor_f") else None,
+        forest=load_forest(forest_file(run)) if forest_file(run).exists() else None,
+    )
+
+
+PREDICTING: Mapping[PredictorName, tuple[str, ...]] = {
+    "networks": ("regressor", "confnet", "gradnet", "regressor_f"),
+    "sgbm": ("confnet_free", "gradnet_free"),
+}
+"""The networks that fill the fields of `EvaluationFrame` that methods look at."""
+
+
+def network_digests(run: Path, predictor: PredictorName = "networks") -> dict[str, str]:
+    """SHA-256 of the weights of each network that predicts, of those a run folder has."""
+    return {
+        task: hashlib.sha256(weights_path(run, task).read_bytes()).hexdigest()
+        for task in PREDICTING[predictor]
+        if has_weights(run, task)
+    }
+
+
+def forest_file(run: Path) -> Path:
+    """Where a run folder keeps its random forest."""
+    return run / "rdf.safetensors"
+
+
+def open_matching(run: Path, device: str = "cpu", matcher: SGBMParameters | None = None) -> MatchingPredictor:
+    """Semi-global matching with those networks of a run folder that need no regressor."""
+    return MatchingPredictor(FreePredictor(run, device), matcher or SGBMParameters())
+
+
+def fallback_notes(run: Path) -> list[str]:
+    """A sentence for each network that a foreign disparity has to do without."""
+    notes = []
+    for task, instead in (
+        ("confnet_free", "confidence is taken from left-right consistency and texture"),
+        ("gradnet_free", "slopes are taken from the disparity itself"),
+    ):
+        if not has_weights(run, task):
+            notes.append(f"without a {task} ({run} has none), {instead}")
+    return notes
+
+
+def train_command(network: str, run: Path) -> str:
+    """What to type to have a network in a run folder."""
+    return f"stereoforge train {network} --data DATA --out {run}"
+
+
+def untrained(methods: Sequence[Method], run: Path, predictor: PredictorName) -> dict[str, list[str]]:
+    """Methods by name that a run folder does not serve, and the networks it lacks for each.
+
+    Judging semi-global matching needs none: what no network says is made by hand. It has no fine-tuned counterpart.
+    """
+    networks = {"fine_tuned": "regressor_f"}
+    if predictor == "networks":
+        networks |= {"confidence": "confnet", "gradient": "gradnet"}
+    lacking = {
+        method.name: [
+            network
+            for needed, network in networks.items()
+            if needed in method.needs and (predictor == "sgbm" or not has_weights(run, network))
+        ]
+        for method in methods
+    }
+    return {name: missing for name, missing in lacking.items() if missing}
+
+
+def untrained_notes(lacking: Mapping[str, Sequence[str]], run: Path, predictor: PredictorName) -> list[str]:
+    """A sentence for each network that methods have to do without (`untrained`), and what makes one."""
+    needed_by: dict[str, list[str]] = {}
+    for method, networks in lacking.items():
+        for network in networks:
+            needed_by.setdefault(network, []).append(method)
+    notes = []
+    for network, methods in needed_by.items():
+        if predictor == "networks":
+            reason, remedy = f"{run} has no {network}", f": {train_command(network, run)} makes one"
+        else:
+            reason, remedy = "semi-global matching has no fine-tuned counterpart", ""
+        notes.append(f"{reason}, so {', '.join(methods)} cannot run{remedy}")
+    return notes
+
+
+def predict_pair(
+    left: Image,
+    right: Image,
+    given: tuple[Map, Map | None] | None,
+    run: Path,
+    device: str,
+    predictor: PredictorName,
+) -> tuple[Prediction, list[str]]:
+    """All that refining one pair takes, and sentences on what had to be done without.
+
+    Args:
+        given: The left view's disparity and perhaps the right view's, instead of a predictor.
+
+    Raises:
+        CommandError: The run folder lacks a network.
+        TrainingError: Anything wrong with the run folder, or with the images.
+    """
+    if given is not None or predictor == "sgbm":
+        if left.shape != right.shape:
+            raise CommandError(
+                f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
+                f"right {right.shape[1]}x{right.shape[0]}"
+            )
+        matching = open_matching(run, device)
+        answer = matching.predict(left, right) if given is None else matching.predict_for(left, right, *given)
+        return answer, fallback_notes(run)
+    answer = StereoPredictor(run, device).predict(left, right)
+    for name, found in (("confnet", answer.confidence), ("gradnet", answer.gradient)):
+        if found is None:
+            raise CommandError(
+                f"{run}: has no {name}, which refining needs: {train_command(name, run)} makes one"
+            )
+    return answer, []
+
+
+def parameters_file(run: Path, predictor: PredictorName = "networks") -> Path:
+    """Where a run folder keeps validated parameters: those that suit its networks, or another predictor."""
+    return run / ("parameters.json" if predictor == "networks" else f"parameters_{predictor}.json")
+
+
+def open_settings(file: Path | None, run: Path, predictor: PredictorName = "networks") -> Settings:
+    """The methods' parameters: of the file, or of the one in the run folder, or the defaults."""
+    if file is not None:
+        return read_settings(file)
+    if parameters_file(run, predictor).exists():
+        return read_settings(parameters_file(run, predictor))
+    return Settings()

@@ -1,0 +1,133 @@
+"""Joining data sets, networks and the MRF into evaluations and their report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from datagen import StereoSample
+from datagen.dataset.manifest import read_manifest
+from datagen.sources.registry import open_source
+from datagen.sources.stereo_frame import StereoFrame
+from refine.evaluation.evaluate import EvaluationOptions, evaluate
+from refine.evaluation.results import EvaluatedSet
+from refine.evaluation.settings import Settings
+from refine.methods.base import Method
+from refine.report.write import ReportContext, ReportFiles, write_report
+from stereoforge.pipelines.prediction import Predictors
+from stereoforge.progress import progress_bar
+from training.presets import TASKS
+from training.runs.weights import has_weights, read_summary
+
+KITTI_BAD_PX = 3.0
+"""KITTI's threshold of a bad pixel; everybody else's is 1 px."""
+
+
+@dataclass(frozen=True)
+class TestData:
+    """Frames to evaluate on, with what a reader wants to know of them."""
+
+    name: str
+    frames: Sequence[StereoFrame]
+    family: str
+    """The family of our worlds, or the format of somebody else's data set."""
+    split: str
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+    __test__ = False
+    """Not a test, whatever pytest thinks of its name."""
+
+
+def open_test_data(sources: Sequence[str], split: str) -> list[TestData]:
+    """Open data sets as `datagen.sources.registry` takes them; raises DatasetError, naming what is wrong.
+
+    A set is called after its folder, or by all of its source where two folders have one name.
+    """
+    short = [Path(source.partition("#")[0]).name or source for source in sources]
+    names = [name if short.count(name) == 1 else source for name, source in zip(short, sources, strict=True)]
+    opened = []
+    for name, source in zip(names, sources, strict=True):
+        frames = open_source(source).frames(split)
+        family = family_of(source, frames)
+        facts = {"Source": source, "Split": split} | ({"Family": family} if family else {})
+        opened.append(TestData(name, frames, family, split, facts))
+    return opened
+
+
+def family_of(source: str, frames: Sequence[StereoFrame]) -> str:
+    """The family that rendered a set of ours, by its first scene's manifest; else the format's name."""
+    first = frames[0]
+    if isinstance(first, StereoSample):
+        return read_manifest(first.layout.manifest(first.split, first.scene)).family
+    return open_source(source).format.name
+
+
+def evaluation_options(
+    family: str, bad_threshold: float | None = None, posterior_samples: int = 0
+) -> EvaluationOptions:
+    """The measures' thresholds: those asked for, or the data's custom."""
+    custom = KITTI_BAD_PX if family.startswith("kitti") else EvaluationOptions().bad_threshold
+    return EvaluationOptions(
+        bad_threshold=custom if bad_threshold is None else bad_threshold, posterior_samples=posterior_samples
+    )
+
+
+def evaluate_set(
+    data: TestData,
+    predictors: Predictors,
+    methods: tuple[Method, ...] = (),
+    options: EvaluationOptions | None = None,
+) -> EvaluatedSet:
+    """Run the networks and every method on every frame, showing progress."""
+    with progress_bar() as progress:
+        what = f"evaluating on {data.name}"
+        task = progress.add_task(f"{what} (compiling, after an install)", total=len(data.frames))
+        evaluation = evaluate(
+            (predictors.frame(frame) for frame in data.frames),
+            methods,
+            options or evaluation_options(data.family),
+            progress=lambda done, _: progress.update(task, completed=done, description=what),
+        )
+    return EvaluatedSet(data.name, evaluation, data.family, data.split, data.facts)
+
+
+def report_evaluation(
+    sets: Sequence[EvaluatedSet],
+    weights: Path,
+    out: Path,
+    *,
+    limits: tuple[str, ...] = (),
+    title: str = "StereoForge evaluation",
+    facts: Mapping[str, str] | None = None,
+    bootstrap_seed: int = 0,
+    sections: str = "",
+    compact: bool = False,
+) -> ReportFiles:
+    """Write the report, saying what was evaluated with what; the arguments are those of `ReportContext`."""
+    context = ReportContext(
+        title=title,
+        facts={"Weights": "; ".join(describe_networks(weights)), **(facts or {})},
+        limits=limits,
+        bootstrap_seed=bootstrap_seed,
+        sections=sections,
+        compact=compact,
+    )
+    return write_report(sets, out, context)
+
+
+def describe_settings(settings: Settings) -> str:
+    """Where the methods' parameters come from."""
+    if not settings.methods:
+        return "the methods' defaults"
+    frames = len(settings.about.get("frames", ()))
+    data = ", ".join(map(str, settings.about.get("data", ())))
+    return f"chosen on {frames} validation frames of {data}"
+
+
+def describe_networks(weights: Path) -> Iterator[str]:
+    """A phrase for each network of a run folder."""
+    for task in TASKS:
+        if has_weights(weights, task):
+            summary = read_summary(weights, task)
+            yield f"{task} ({summary.preset}, step {summary.best_step} of {summary.steps})"

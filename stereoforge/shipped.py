@@ -1,8 +1,0 @@
-"""The trained networks that come with StereoForge."""
-
-from __future__ import annotations
-
-from pathlib import Path
-
-SHIPPED_WEIGHTS = Path(__file__).resolve().parents[1] / "weights"
-"""A run folder like any other, trained by `make study` on its flying_things worlds; its model_card.md says how."""

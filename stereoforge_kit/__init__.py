@@ -1,0 +1,1 @@
+"""What the packages share: files, processes, pictures and pages, classical matching, errors."""

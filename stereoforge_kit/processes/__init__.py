@@ -1,0 +1,14 @@
+"""Processes that may crash, hang or eat memory without harm: what runs in them is limited and replaceable."""
+
+from stereoforge_kit.processes.call import call_limited
+from stereoforge_kit.processes.limits import Limits, available_memory_bytes
+from stereoforge_kit.processes.process import WorkerError, WorkerProcess, captured_output
+
+__all__ = [
+    "Limits",
+    "WorkerError",
+    "WorkerProcess",
+    "available_memory_bytes",
+    "call_limited",
+    "captured_output",
+]

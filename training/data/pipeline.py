@@ -1,0 +1,302 @@
+"""Stereo data sets as a stream of training crops and a list of validation frames.
+
+Every crop of a run has a number, its draw. Which frame a draw takes and how it is augmented follow from the seed and
+that number alone, so results depend neither on the number of workers nor on where a run was interrupted.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytorch_lightning as pl
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.utils.data import DataLoader, Dataset
+
+from datagen.sources.registry import open_source
+from datagen.sources.stereo_frame import StereoFrame
+from datagen.sources.webdataset import ShardFrames
+from training.data.augmentation import IDENTITY_CURVE, StereoPair, TrainingSample, Window, augment, cut
+from training.errors import TrainingError
+from training.networks.regressors.dispnet import STRIDE
+from training.presets import Preset
+from training.runs.provenance import data_fingerprint
+
+DEFAULT_CACHE_BYTES = 2 << 30
+IMAGE_MEAN_FRAMES = 100
+SHARDS_TOGETHER = 8
+CURRICULUM_PARTS = 10
+"""A curriculum adds a tenth of every data set at a time."""
+
+Batch = dict[str, Tensor]
+"""`left`, `right` (B, 3, H, W) in 0..1, `disparity` (B, 1, H, W), `gradient` (B, 2, H, W), NaN invalid."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A data set and how often it is drawn from, relative to the others."""
+
+    frames: Sequence[StereoFrame]
+    weight: float = 1.0
+    fingerprint: str = ""
+    """What identifies the frames (`training.runs.provenance`)."""
+
+
+def read_pair(frame: StereoFrame) -> StereoPair:
+    """Decode what training needs of a frame."""
+    return StereoPair(frame.left, frame.right, frame.disparity_left, frame.disparity_right)
+
+
+class PairCache:
+    """The decoded frames of all sources; the first of them, up to a number of bytes, stay in memory.
+
+    Filled before worker processes are forked, so that they share it.
+    """
+
+    def __init__(self, sources: Sequence[Source], capacity_bytes: int = DEFAULT_CACHE_BYTES) -> None:
+        self._sources = sources
+        self._pairs: dict[tuple[int, int], StereoPair] = {}
+        for key in self._interleaved():
+            pair = read_pair(sources[key[0]].frames[key[1]])
+            capacity_bytes -= pair.nbytes
+            if capacity_bytes < 0:
+                break
+            self._pairs[key] = pair
+
+    def __len__(self) -> int:
+        return len(self._pairs)
+
+    def __getitem__(self, key: tuple[int, int]) -> StereoPair:
+        """The pair of (source, frame)."""
+        pair = self._pairs.get(key)
+        return read_pair(self._sources[key[0]].frames[key[1]]) if pair is None else pair
+
+    def name(self, source: int, frame: int) -> str:
+        return self._sources[source].frames[frame].name
+
+    def first(self, count: int) -> Iterator[StereoPair]:
+        """The first pairs, all sources in turn."""
+        return (self[key] for key in itertools.islice(self._interleaved(), count))
+
+    def _interleaved(self) -> Iterator[tuple[int, int]]:
+        longest = max(len(source.frames) for source in self._sources)
+        for frame in range(longest):
+            for index, source in enumerate(self._sources):
+                if frame < len(source.frames):
+                    yield index, frame
+
+
+def schedule_draws(
+    sources: Sequence[Source], draws: int, seed: int, curriculum: float = 0.0
+) -> NDArray[np.int64]:
+    """Which (source, frame) each draw takes, (draws, 2): sources by weight, frames in a new order every pass.
+
+    Over the first `curriculum` of the draws (0..1) the frames are those of a growing first part of every source, in the
+    source's own order. Without, a longer schedule begins with the shorter one. Shards are taken a few at a time, so
+    that remote ones can be fetched as the run goes on.
+    """
+    weights = np.array([source.weight for source in sources], np.float64)
+    rng = np.random.default_rng([seed, 0])
+    chosen = np.searchsorted(np.cumsum(weights / weights.sum())[:-1], rng.random(draws), side="right")
+    parts = np.arange(1, CURRICULUM_PARTS)
+    ends = np.rint(draws * curriculum * parts / parts[-1]).astype(int)
+    schedule = np.empty((draws, 2), np.int64)
+    for index, source in enumerate(sources):
+        places = np.flatnonzero(chosen == index)
+        order = np.random.default_rng([seed, 1, index])
+        frames = [
+            _passes(order, source.frames, share, len(stage))
+            for share, stage in zip(
+                np.append(parts, CURRICULUM_PARTS) / CURRICULUM_PARTS,
+                np.split(places, np.searchsorted(places, ends)),
+                strict=True,
+            )
+        ]
+        schedule[places, 0] = index
+        schedule[places, 1] = np.concatenate(frames)
+    return schedule
+
+
+def _passes(
+    rng: np.random.Generator, frames: Sequence[StereoFrame], share: float, count: int
+) -> NDArray[np.int64]:
+    """`count` frames: the first `share` of all, pass after pass."""
+    first = math.ceil(len(frames) * share)
+    passes = [np.empty(0, np.int64)]
+    for _ in range(-(-count // first)):
+        order = shuffle(rng, frames)
+        passes.append(order[order < first])
+    return np.concatenate(passes)[:count]
+
+
+def shuffle(rng: np.random.Generator, frames: Sequence[StereoFrame]) -> NDArray[np.int64]:
+    """A random order of the frames; of those in shards, one that stays in `SHARDS_TOGETHER` shards at a time."""
+    if not isinstance(frames, ShardFrames):
+        return rng.permutation(len(frames))
+    shards = np.split(np.arange(len(frames)), np.cumsum(frames.groups)[:-1])
+    shards = [shards[place] for place in rng.permutation(len(shards))]
+    return np.concatenate(
+        [
+            rng.permutation(np.concatenate(shards[first : first + SHARDS_TOGETHER]))
+            for first in range(0, len(shards), SHARDS_TOGETHER)
+        ]
+    )
+
+
+class CropDataset(Dataset[Batch]):
+    """Draw number to augmented crop."""
+
+    def __init__(
+        self, cache: PairCache, schedule: NDArray[np.int64], preset: Preset, seed: int, draws_per_step: int
+    ) -> None:
+        self._cache = cache
+        self._schedule = schedule
+        self._preset = preset
+        self._seed = seed
+        self._draws_per_step = draws_per_step
+
+    def __getitem__(self, draw: int) -> Batch:
+        source, frame = (int(number) for number in self._schedule[draw])
+        size = (self._preset.crop_height, self._preset.crop_width)
+        pair = self._cache[source, frame]
+        if pair.left.shape[0] < size[0] or pair.left.shape[1] < size[1]:
+            found = pair.left.shape[:2]
+            raise TrainingError(too_small(self._cache.name(source, frame), found, size, found))
+        rng = np.random.default_rng([self._seed, 2, draw])
+        return as_tensors(
+            augment(rng, pair, size, self._preset.augmentation, step=draw // self._draws_per_step)
+        )
+
+
+class FrameDataset(Dataset[Batch]):
+    """Whole frames, as they are."""
+
+    def __init__(self, frames: Sequence[StereoFrame]) -> None:
+        self._frames = frames
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, index: int) -> Batch:
+        pair = read_pair(self._frames[index])
+        height, width = pair.disparity_left.shape
+        whole = cut(pair, Window(0.0, 0.0, 1.0, 1.0), (height, width), (IDENTITY_CURVE, IDENTITY_CURVE))
+        return as_tensors(whole)
+
+
+def as_tensors(sample: TrainingSample) -> Batch:
+    """One sample, channels first."""
+    return {
+        "left": torch.from_numpy(sample.left).permute(2, 0, 1).contiguous(),
+        "right": torch.from_numpy(sample.right).permute(2, 0, 1).contiguous(),
+        "disparity": torch.from_numpy(sample.disparity)[None],
+        "gradient": torch.from_numpy(sample.gradient).permute(2, 0, 1).contiguous(),
+    }
+
+
+class StereoDataModule(pl.LightningDataModule):
+    """Training crops in blocks of `validation_interval` steps (Lightning's epochs), and validation frames."""
+
+    def __init__(
+        self,
+        sources: Sequence[Source],
+        validation: Sequence[StereoFrame],
+        preset: Preset,
+        steps: int,
+        seed: int,
+        workers: int = 0,
+        cache_bytes: int = DEFAULT_CACHE_BYTES,
+    ) -> None:
+        super().__init__()
+        self._preset = preset
+        self._steps = steps
+        self._seed = seed
+        self._workers = workers
+        self._sources = sources
+        self._cache = PairCache(sources, cache_bytes)
+        spread = np.linspace(0, len(validation) - 1, min(preset.validation_samples, len(validation)))
+        self._validation = FrameDataset([validation[round(i)] for i in spread])
+
+    def image_mean(self) -> NDArray[np.float32]:
+        """Mean colour (3,) in 0..1 of the first frames of all sources, both views."""
+        images = [view for pair in self._cache.first(IMAGE_MEAN_FRAMES) for view in (pair.left, pair.right)]
+        mean: NDArray[np.float32] = np.mean([image.mean((0, 1)) for image in images], axis=0) / 255
+        return mean.astype(np.float32)
+
+    def train_dataloader(self) -> DataLoader[Batch]:
+        """The crops of the current block; with several processes, this process's share of every step."""
+        assert self.trainer is not None
+        return self.block(self.trainer.current_epoch, self.trainer.global_rank, self.trainer.world_size)
+
+    def block(self, number: int, rank: int = 0, processes: int = 1) -> DataLoader[Batch]:
+        """The crops of the steps [number * validation_interval, (number + 1) * validation_interval)."""
+        size = self._preset.batch_size
+        per_step = size * processes
+        schedule = schedule_draws(self._sources, self._steps * per_step, self._seed, self._preset.curriculum)
+        interval = self._preset.validation_interval
+        steps = range(number * interval, min((number + 1) * interval, self._steps))
+        batches = [list(range(s * per_step + rank * size, s * per_step + (rank + 1) * size)) for s in steps]
+        crops = CropDataset(self._cache, schedule, self._preset, self._seed, per_step)
+        return DataLoader(crops, batch_sampler=batches, num_workers=self._workers)
+
+    def val_dataloader(self) -> DataLoader[Batch] | list[DataLoader[Batch]]:
+        return DataLoader(self._validation, batch_size=1) if len(self._validation) else []
+
+
+def open_sources(
+    data: Sequence[tuple[str | Path, float]], crop: tuple[int, int], validation: Sequence[str | Path] = ()
+) -> tuple[list[Source], list[StereoFrame]]:
+    """The training frames of each data set with its weight, and the frames to validate on.
+
+    Args:
+        data: sources as `datagen.sources.registry.open_source` takes them, and their weights.
+        crop: (height, width) that every training frame must hold.
+        validation: sources to validate on; without any, the val splits of `data`.
+
+    Raises:
+        TrainingError: no data, a weight that is not positive, or frames smaller than the crop.
+        DatasetError: a source that is no data set or has nothing to train on.
+    """
+    if not data:
+        raise TrainingError("training needs at least one data set")
+    sources: list[Source] = []
+    held_out: list[StereoFrame] = []
+    for location, weight in data:
+        if not weight > 0:
+            raise TrainingError(f"{location}: the weight of a data set must be positive, got {weight}")
+        opened = open_source(location)
+        frames = opened.frames("train")
+        sources.append(Source(frames, weight, data_fingerprint(opened.location, frames)))
+        if not validation:
+            held_out.extend(opened.validation_frames())
+    check_sizes(
+        [(str(location), each.frames[0].size) for (location, _), each in zip(data, sources, strict=True)],
+        crop,
+    )
+    for location in validation:
+        held_out.extend(open_source(location).held_out_frames())
+    return sources, held_out
+
+
+def check_sizes(sizes: Sequence[tuple[str, tuple[int, int]]], crop: tuple[int, int]) -> None:
+    """Raise TrainingError for the first data set, named with its frames' (height, width), that holds no crop; the crop
+    it proposes fits them all."""
+    smallest = min(height for _, (height, _) in sizes), min(width for _, (_, width) in sizes)
+    for name, size in sizes:
+        if size[0] < crop[0] or size[1] < crop[1]:
+            raise TrainingError(too_small(name, size, crop, smallest))
+
+
+def too_small(name: str, size: tuple[int, ...], crop: tuple[int, int], smallest: tuple[int, ...]) -> str:
+    """The sentence about frames that hold no crop, with one that fits `smallest`; sizes are (height, width)."""
+    said = f"{name}: frames of {size[1]}x{size[0]} are smaller than the {crop[1]}x{crop[0]} crops"
+    height, width = (min(least // STRIDE * STRIDE, side) for least, side in zip(smallest, crop, strict=True))
+    if min(height, width) < STRIDE:
+        return f"{said}, and no crop can be smaller than {STRIDE}x{STRIDE}"
+    return f"{said}; crops of {width}x{height} fit (--crop {width}x{height})"

@@ -1,0 +1,1 @@
+"""Networks from a pair of views to a disparity map, one module each."""

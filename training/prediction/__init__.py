@@ -1,0 +1,1 @@
+"""Trained networks at work: on a pair, on a disparity from elsewhere, as ONNX."""

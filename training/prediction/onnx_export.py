@@ -1,0 +1,143 @@
+"""Networks of a run folder as one ONNX file that needs neither torch nor this package."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from torch import Tensor, nn
+from torch.onnx import OnnxExporterError
+
+from stereoforge_kit.files import temporary_folder, write_bytes
+from training.errors import TrainingError
+from training.networks import ConfNet, Correlation1D, DispNetCorr1D, GradNet
+from training.prediction.inference import head_inputs, network_size
+from training.prediction.predictor import StereoPredictor
+
+FILE_NAME = "stereoforge.onnx"
+OPSET = 17
+TOLERANCE = 1e-3
+"""Largest difference to torch, relative to the output's largest value."""
+
+
+@dataclass(frozen=True)
+class ExportedModel:
+    """A file, and how far its answers were from torch's."""
+
+    path: Path
+    outputs: tuple[str, ...]
+    largest_difference: float
+    """Relative to the output's largest value."""
+
+
+class ShiftedCorrelation(nn.Module):
+    """`Correlation1D` as shifted products: slower to run, but the same graph for any image size."""
+
+    def __init__(self, correlation: Correlation1D) -> None:
+        super().__init__()
+        self.reach = correlation.max_displacement
+        self.count = correlation.out_channels
+
+    def forward(self, left: Tensor, right: Tensor) -> Tensor:
+        padded = F.pad(right, (self.reach, self.count - 1 - self.reach))
+        width = left.shape[-1]
+        products = [(left * padded[..., shift : shift + width]).mean(dim=1) for shift in range(self.count)]
+        return torch.stack(products, dim=1)
+
+
+class ExportedNetworks(nn.Module):
+    """Everything a run folder says about a pair; left and right are (B, 3, H, W) in 0..1, sides multiples of 64."""
+
+    def __init__(self, regressor: DispNetCorr1D, confnet: ConfNet | None, gradnet: GradNet | None) -> None:
+        super().__init__()
+        self.regressor, self.confnet, self.gradnet = regressor, confnet, gradnet
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        names = {
+            "disparity": True,
+            "confidence": self.confnet is not None,
+            "gradient": self.gradnet is not None,
+        }
+        return tuple(name for name, there in names.items() if there)
+
+    def forward(self, left: Tensor, right: Tensor) -> tuple[Tensor, ...]:
+        """disparity (B, 1, H, W) px; confidence (B, 1, H, W); gradient (B, 2, H, W) [dx, dy]."""
+        seen = head_inputs(self.regressor, self.confnet, self.gradnet, left, right)
+        answers = [seen.regression.disparity]
+        if self.confnet is not None:
+            answers.append(self.confnet.confidence(*seen.confnet))
+        if self.gradnet is not None:
+            answers.append(self.gradnet(*seen.gradnet))
+        return tuple(answers)
+
+
+def export_model(run: Path, out: Path) -> ExportedModel:
+    """Write `stereoforge.onnx` with the regressor of a run folder and what else it holds, for images of any size.
+
+    The file is run by onnxruntime on two sizes and compared with torch before it is kept.
+
+    Raises:
+        TrainingError: no regressor, damaged weights, a network that ONNX cannot express, or answers that differ.
+    """
+    networks = ExportedNetworks(*StereoPredictor(run).networks).eval()
+    with temporary_folder() as folder:
+        written = folder / FILE_NAME
+        try:
+            _write(networks, written)
+        except OnnxExporterError as error:
+            raise TrainingError(f"{run}: torch cannot write it as ONNX: {_first_sentence(error)}") from error
+        difference = max(_compare(networks, written, size) for size in ((64, 128), (128, 192)))
+        if not difference <= TOLERANCE:
+            raise TrainingError(f"{run}: onnxruntime's answers differ from torch's by {difference:.2g}")
+        path = out / FILE_NAME
+        write_bytes(path, written.read_bytes())
+    return ExportedModel(path, networks.outputs, difference)
+
+
+def _first_sentence(error: Exception) -> str:
+    """torch's message goes on with the whole graph."""
+    return re.split(r"[.\n]\s", str(error).strip(), maxsplit=1)[0]
+
+
+def _write(networks: ExportedNetworks, path: Path) -> None:
+    correlation = networks.regressor.correlation
+    names = ("left", "right", *networks.outputs)
+    networks.regressor.correlation = ShiftedCorrelation(correlation)  # type: ignore[assignment]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore"
+            )  # tracing's remarks about checks of shapes, which hold for any size
+            torch.onnx.export(
+                networks,
+                (torch.rand(1, 3, 64, 128), torch.rand(1, 3, 64, 128)),
+                str(path),
+                input_names=list(names[:2]),
+                output_names=list(names[2:]),
+                dynamic_axes={name: {0: "batch", 2: "height", 3: "width"} for name in names},
+                opset_version=OPSET,
+                dynamo=False,
+            )
+    finally:
+        networks.regressor.correlation = correlation
+
+
+def _compare(networks: ExportedNetworks, path: Path, size: tuple[int, int]) -> float:
+    import onnxruntime
+
+    assert network_size(*size) == size
+    generator = torch.Generator().manual_seed(0)
+    left, right = torch.rand(2, 1, 3, *size, generator=generator)
+    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    answers = session.run(None, {"left": left.numpy(), "right": right.numpy()})
+    with torch.no_grad():
+        expected = networks(left, right)
+    return max(
+        float((torch.from_numpy(answer) - truth).abs().max() / truth.abs().max().clamp(min=1))
+        for answer, truth in zip(answers, expected, strict=True)
+    )

@@ -1,0 +1,1 @@
+"""A training run: the loop, checkpoints, weights on disk, the model card."""

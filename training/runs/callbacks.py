@@ -1,0 +1,97 @@
+"""Progress on the terminal, and the best weights on disk while a run goes on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytorch_lightning as pl
+from rich.console import Console
+
+from stereoforge_kit.viewing import JobProgress
+from training.tasks import StereoTask
+
+
+class BestWeights(pl.Callback):
+    """Hands the network over for saving whenever its validation figure is the best so far.
+
+    Without validation frames, or where they have no truth for the figure, the latest weights are the best. The
+    figure to beat is part of the checkpoint, so a resumed run goes on comparing.
+    """
+
+    def __init__(self, save: Callable[[int, dict[str, float]], None]) -> None:
+        """save: called with the steps done and the validation figures."""
+        self._save = save
+        self._best = math.inf
+        self._step = 0
+
+    def on_train_epoch_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:
+        if trainer.global_step == self._step:
+            return  # Lightning ends the checkpoint's epoch once more after resuming, without validating
+        self._step = trainer.global_step
+        figures = validation_figures(trainer)
+        value = figures.get(pl_module.monitor.removeprefix("validation/"))
+        if value is None or math.isnan(value):  # nothing to measure: the latest weights are the best
+            value = math.inf
+        elif not value < self._best:
+            return
+        self._best = value
+        if trainer.is_global_zero:
+            self._save(trainer.global_step, figures)
+
+    def state_dict(self) -> dict[str, Any]:
+        return {"best": self._best, "step": self._step}
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        self._best, self._step = state_dict["best"], state_dict["step"]
+
+
+class RunProgress(pl.Callback):
+    """One bar over the whole run with the time left, and a line for every validation."""
+
+    def __init__(self, title: str) -> None:
+        self._console = Console(stderr=True)
+        self._progress = JobProgress(self._console, "loss {task.fields[loss]:.3f}", transient=True)
+        self._title = title
+
+    def on_train_start(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002
+        if not trainer.is_global_zero:
+            self._console.quiet = True
+        self._bar = self._progress.add_task(
+            self._title, total=trainer.max_steps, completed=trainer.global_step, loss=math.nan
+        )
+        self._progress.start()
+
+    def on_train_batch_end(
+        self,
+        trainer: pl.Trainer,
+        pl_module: StereoTask,  # noqa: ARG002
+        outputs: Any,
+        batch: Any,  # noqa: ARG002
+        batch_idx: int,  # noqa: ARG002
+    ) -> None:
+        self._progress.update(self._bar, completed=trainer.global_step, loss=float(outputs["loss"]))
+
+    def on_train_epoch_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002
+        figures = "  ".join(f"{name} {value:.4g}" for name, value in validation_figures(trainer).items())
+        if not figures:  # as when Lightning ends the checkpoint's epoch once more after resuming
+            return
+        self._console.print(
+            f"{self._title} step {trainer.global_step}  {figures}", highlight=False, soft_wrap=True
+        )
+
+    def on_train_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002
+        self._progress.stop()
+
+    def on_exception(self, trainer: pl.Trainer, pl_module: StereoTask, exception: BaseException) -> None:  # noqa: ARG002
+        self._progress.stop()
+
+
+def validation_figures(trainer: pl.Trainer) -> dict[str, float]:
+    """The figures of the last validation, by their short names."""
+    return {
+        name.removeprefix("validation/"): float(value)
+        for name, value in trainer.callback_metrics.items()
+        if name.startswith("validation/")
+    }

@@ -1,0 +1,78 @@
+"""`model_card.md` beside the weights: what each network of a run folder is, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from stereoforge_kit.files import write_text
+from training.presets import TASKS
+from training.runs.weights import TrainingSummary, has_weights, read_summary, weights_path
+
+FILE_NAME = "model_card.md"
+_WHAT = {
+    "regressor": "DispNetCorr1D: disparity of the left view from a rectified pair",
+    "regressor_f": "DispNetCorr1D fine-tuned on disparity gradients too (eq. 9 of the paper)",
+    "confnet": "ConfNet: the probability that a disparity of `regressor` is right",
+    "gradnet": "GradNet: forward differences of the disparity",
+    "confnet_free": "ConfNet without matching features: for disparities of any origin",
+    "gradnet_free": "GradNet without matching features: for disparities of any origin",
+}
+_FIGURES = {
+    "epe": "end-point error, px",
+    "bad1": "share of pixels off by more than 1 px",
+    "bad3": "share of pixels off by more than 3 px",
+    "refined_epe": "end-point error of the refined disparity, px",
+    "refined_bad1": "share of pixels off by more than 1 px once refined",
+    "refined_gradient": "gradient error of the refined disparity on smooth pixels, px per px",
+    "gradient": "gradient error on smooth pixels, px per px",
+    "gradient_regressor": "the regressor's gradient error there",
+    "gradient_matched": "the matcher's gradient error there",
+    "auc": "area under the sparsification curve",
+    "auc_random": "area of a random order",
+    "auc_optimal": "area of the best order",
+}
+
+
+def write_model_card(run: Path, folder: Path | None = None) -> Path:
+    """Describe all networks of a run folder, there or in another folder.
+
+    Raises TrainingError for damaged descriptions.
+    """
+    lines = [
+        "# Model card",
+        "",
+        "Networks of *Learning to refine depth for robust stereo estimation* (Cheng, He, Zhang, 2018), trained from "
+        "scratch with StereoForge. Input: rectified colour pairs; disparities are pixels of the input. The weights "
+        "are safetensors (numbers only) with a JSON description each.",
+    ]
+    for task in TASKS:
+        if has_weights(run, task):
+            lines += ["", f"## {weights_path(run, task).name}", "", f"{_WHAT[task]}.", ""]
+            lines += _describe(read_summary(run, task))
+    lines += [
+        "",
+        "## Limits",
+        "",
+        "Trained on rendered worlds unless the data above says otherwise; expect a loss of accuracy on photographs, "
+        "on disparities beyond those of the training set, and where matching has nothing to hold on to (sky, glass, "
+        "repetition). The figures are of validation frames, most often of the same source as the training set.",
+    ]
+    path = (folder or run) / FILE_NAME
+    write_text(path, "\n".join(lines) + "\n")
+    return path
+
+
+def _describe(summary: TrainingSummary) -> Iterator[str]:
+    yield "| | |"
+    yield "|---|---|"
+    yield f"| preset | {summary.preset} |"
+    yield f"| steps | {summary.best_step} of {summary.steps} (the best by validation) |"
+    yield f"| seed | {summary.seed} |"
+    for (source, weight), fingerprint in zip(summary.data, summary.fingerprints, strict=True):
+        yield f"| data, weight {weight:g} | {source}: {fingerprint} |"
+    for name, value in summary.validation.items():
+        yield f"| validation: {_FIGURES.get(name, name)} | {value:.4g} |"
+    if not summary.validation:
+        yield "| validation | none: the last weights are kept |"
+    yield f"| code | {summary.revision} |"

@@ -1,0 +1,199 @@
+"""Trained networks on disk: `<run>/<task>.safetensors` and `<run>/<task>.json`.
+
+Reading them runs no code: safetensors hold numbers only, and the JSON is structured into typed records. The JSON
+carries the digest of the tensors' file, so a damaged or mixed-up pair is refused.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import cattrs
+import safetensors.torch
+import torch
+from safetensors import SafetensorError
+from torch import Tensor, nn
+
+from stereoforge_kit.files import write_bytes, write_text
+from training.errors import TrainingError
+from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
+
+Network = TypeVar("Network", bound=nn.Module)
+FORMAT = 1
+MAX_DESCRIPTION_BYTES = 1 << 20
+_CONVERTER = cattrs.Converter(forbid_extra_keys=True)
+
+
+@dataclass(frozen=True)
+class TrainingSummary:
+    """How a network came about."""
+
+    preset: str
+    steps: int
+    """Of the whole run."""
+    seed: int
+    data: tuple[tuple[str, float], ...]
+    """Folder and weight of each data set."""
+    best_step: int
+    """Steps done when these weights were taken."""
+    validation: dict[str, float] = field(default_factory=dict)
+    """Figures of these weights on the validation frames; empty where there were none."""
+    fingerprints: tuple[str, ...] = ()
+    """What identifies each data set's frames."""
+    revision: str = ""
+    """Version and git revision of the code."""
+
+
+@dataclass(frozen=True)
+class StoredNetwork(Generic[Network]):
+    """A network read from a run folder."""
+
+    network: Network
+    """In evaluation mode, on the CPU."""
+    sha256: str
+    """Digest of the tensors' file."""
+    regressor_sha256: str | None
+    """Digest of the regressor that a ConfNet or GradNet was trained on."""
+    training: TrainingSummary
+
+
+def weights_path(run: Path, task: str) -> Path:
+    return run / f"{task}.safetensors"
+
+
+def save_weights(
+    run: Path,
+    task: str,
+    network: DispNetCorr1D | ConfNet | GradNet,
+    training: TrainingSummary,
+    regressor_sha256: str | None = None,
+) -> None:
+    """Write a network, each file at once or not at all."""
+    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
+    content = safetensors.torch.save(tensors)
+    description = {
+        "format": FORMAT,
+        "task": task,
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "regressor_sha256": regressor_sha256,
+        "network": asdict(network.config),
+        "training": asdict(training),
+    }
+    write_bytes(weights_path(run, task), content)
+    write_text(run / f"{task}.json", json.dumps(description, indent=2) + "\n")
+
+
+def load_regressor(run: Path, task: str = "regressor") -> StoredNetwork[DispNetCorr1D]:
+    """Read `regressor` or `regressor_f` of a run folder. Raises TrainingError, naming what is wrong."""
+    return _load(run, task, lambda config: DispNetCorr1D(_structure(config, DispNetConfig)))
+
+
+def load_confnet(run: Path, task: str = "confnet") -> StoredNetwork[ConfNet]:
+    """Read `confnet` or `confnet_free` of a run folder. Raises TrainingError, naming what is wrong."""
+    return _load(run, task, lambda config: ConfNet(_structure(config, HeadConfig)))
+
+
+def load_gradnet(run: Path, task: str = "gradnet") -> StoredNetwork[GradNet]:
+    """Read `gradnet` or `gradnet_free` of a run folder. Raises TrainingError, naming what is wrong."""
+    return _load(run, task, lambda config: GradNet(_structure(config, HeadConfig)))
+
+
+def on_regressor(run: Path, task: str, stored: StoredNetwork[Network], regressor_sha256: str) -> Network:
+    """A head that was trained on this regressor; TrainingError if it was on another."""
+    if stored.regressor_sha256 != regressor_sha256:
+        raise TrainingError(
+            f"{run}: its {task} was trained on another regressor than the folder's; train it again"
+        )
+    return stored.network
+
+
+def read_summary(run: Path, task: str) -> TrainingSummary:
+    """How the network of a run folder came about. Raises TrainingError, naming what is wrong."""
+    path = run / f"{task}.json"
+    try:
+        summary: TrainingSummary = _structure(_read_description(path, task)["training"], TrainingSummary)
+    except ValueError as error:
+        raise TrainingError(f"{path}: does not describe a trained network ({error})") from error
+    return summary
+
+
+def copy_weights(source: Path, target: Path, task: str) -> None:
+    """Copy a network, intact, from one run folder to another. Raises TrainingError, naming what is wrong."""
+    loaders = {"regressor": load_regressor, "confnet": load_confnet, "gradnet": load_gradnet}
+    loaders[task.split("_")[0]](source, task)
+    for path in (weights_path(source, task), source / f"{task}.json"):
+        write_bytes(target / path.name, path.read_bytes())
+
+
+def has_weights(run: Path, task: str) -> bool:
+    return weights_path(run, task).exists()
+
+
+def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -> StoredNetwork[Network]:
+    path, description_path = weights_path(run, task), run / f"{task}.json"
+    if not run.is_dir():
+        raise TrainingError(f"{run}: there is no such run folder")
+    for needed in (path, description_path):
+        if not needed.is_file():
+            raise TrainingError(f"{needed}: missing, so {run} holds no trained {task}")
+    description = _read_description(description_path, task)
+    content = path.read_bytes()
+    digest = hashlib.sha256(content).hexdigest()
+    if digest != description["sha256"]:
+        raise TrainingError(f"{path}: damaged, or of another run than {description_path.name} beside it")
+    try:
+        # Without memory of its own, the network takes no more than the file holds, whatever sizes it describes.
+        with torch.device("meta"):
+            network = build(description["network"])
+        _fill(network, safetensors.torch.load(content))
+        training = _structure(description["training"], TrainingSummary)
+    except (SafetensorError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        raise TrainingError(
+            f"{path}: does not hold the {task} that {description_path.name} describes ({_first_line(error)})"
+        ) from error
+    network.eval()
+    return StoredNetwork(network, digest, description["regressor_sha256"], training)
+
+
+def _fill(network: nn.Module, tensors: Mapping[str, Tensor]) -> None:
+    """Make the tensors the network's. Raises RuntimeError or ValueError where names, shapes or types differ."""
+    wanted = network.state_dict()
+    odd = [name for name, tensor in tensors.items() if name in wanted and tensor.dtype != wanted[name].dtype]
+    if odd:
+        raise ValueError(
+            f"{odd[0]} holds {tensors[odd[0]].dtype} where the network has {wanted[odd[0]].dtype}"
+        )
+    network.load_state_dict(tensors, assign=True)
+
+
+def _read_description(path: Path, task: str) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > MAX_DESCRIPTION_BYTES:
+            raise ValueError(f"{path.stat().st_size} bytes are more than any description has")
+        description = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise TrainingError(f"{path}: cannot be read as JSON ({error})") from error
+    keys = {"format", "task", "sha256", "regressor_sha256", "network", "training"}
+    if not isinstance(description, dict) or description.keys() != keys:
+        raise TrainingError(f"{path}: does not describe a trained network")
+    if description["format"] != FORMAT:
+        raise TrainingError(f"{path}: has format {description['format']}, this version reads {FORMAT}")
+    if description["task"] != task:
+        raise TrainingError(f"{path}: describes a {description['task']}, not a {task}")
+    return description
+
+
+def _structure(values: Any, kind: type[Any]) -> Any:
+    try:
+        return _CONVERTER.structure(values, kind)
+    except (cattrs.BaseValidationError, cattrs.StructureHandlerNotFoundError) as error:
+        raise ValueError("; ".join(cattrs.transform_error(error))) from error
+
+
+def _first_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]

@@ -1,0 +1,58 @@
+"""Training ConfNet and GradNet on the disparity of semi-global matching, without a regressor."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from training.data.pipeline import Batch
+from training.networks import ConfNet, GradNet
+from training.networks.cost_features import Evidence
+from training.prediction.regressor_free import match_batch
+from training.presets import FreeConfNetPreset, FreeGradNetPreset
+from training.tasks.head_objectives import ConfidenceTask, GradientTask
+
+
+class FreeConfNetTask(ConfidenceTask):
+    """`confnet_free`, of disparities that are matched as the run goes."""
+
+    def __init__(self, preset: FreeConfNetPreset, network: ConfNet, steps: int, seed: int) -> None:
+        super().__init__(preset, steps, seed)
+        self.network = network
+        self.correct_within_px = preset.correct_within_px
+        self.matcher = preset.matcher
+
+    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+        with torch.no_grad():
+            left, right = batch["left"], batch["right"]
+            matched = match_batch(left, right, self.matcher)
+            evidence = Evidence(left, right, matched.disparity)
+            inputs = self.network.inputs(matched.features, matched.consistency, evidence)
+        return inputs, matched.disparity
+
+    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
+        inputs, disparity = self.head_inputs(batch)
+        return disparity, self.kept_network.confidence(*inputs)
+
+
+class FreeGradNetTask(GradientTask):
+    """`gradnet_free`, with disparities to do better than that are matched as the run goes."""
+
+    initial = "matched"
+
+    def __init__(self, preset: FreeGradNetPreset, network: GradNet, steps: int, seed: int) -> None:
+        super().__init__(preset, steps, seed)
+        self.network = network
+        self.threshold_px = preset.gradient_threshold_px
+        self.matcher = preset.matcher
+
+    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+        with torch.no_grad():
+            left, right = batch["left"], batch["right"]
+            matched = match_batch(left, right, self.matcher)
+            inputs = self.network.inputs(matched.features, Evidence(left, right, matched.disparity))
+        return inputs, matched.disparity
+
+    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
+        inputs, disparity = self.head_inputs(batch)
+        return disparity, self.kept_network(*inputs)
