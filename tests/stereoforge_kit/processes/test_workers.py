@@ -110,7 +110,7 @@ def test_every_kind_of_end(kind: str, failure: str, sentence: str) -> None:
 
 PARENT = """
 import sys, time
-from tests.workers.test_workers import misbehave
+from tests.stereoforge_kit.processes.test_workers import misbehave
 from stereoforge_kit.processes import WorkerProcess
 if __name__ == "__main__":
     worker = WorkerProcess()
@@ -123,7 +123,7 @@ if __name__ == "__main__":
 
 
 FORGETFUL = """
-from tests.workers.test_workers import add
+from tests.stereoforge_kit.processes.test_workers import add
 from stereoforge_kit.processes import WorkerProcess
 if __name__ == "__main__":
     worker = WorkerProcess()
