@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg
 
 from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.matching import fill_nearest
 
 Floats = NDArray[np.float64]
@@ -59,7 +60,7 @@ class FBS(Method):
         for name in ("sigma_spatial_px", "sigma_luma", "sigma_chroma", "smoothness", "confidence_floor"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"the bilateral solver's {name} must be positive, got {value}")
+                raise InputError(f"the bilateral solver's {name} must be positive, got {value}")
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
         assert frame.confidence is not None

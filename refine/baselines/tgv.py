@@ -17,6 +17,7 @@ from scipy.ndimage import gaussian_filter
 
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.matching import fill_nearest
 
 Map = NDArray[np.float32]
@@ -68,9 +69,9 @@ class TGV(Method):
         for name in ("alpha1", "alpha0", "data_weight", "tensor_exponent", "iterations"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"TGV's {name} must be positive, got {value}")
+                raise InputError(f"TGV's {name} must be positive, got {value}")
         if not self.tensor_strength >= 0:
-            raise ValueError(f"TGV's tensor_strength must be at least 0, got {self.tensor_strength}")
+            raise InputError(f"TGV's tensor_strength must be at least 0, got {self.tensor_strength}")
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
         assert frame.confidence is not None

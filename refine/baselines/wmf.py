@@ -14,6 +14,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from stereoforge_kit.errors import InputError
 
 LARGEST_SQUARED_DIFFERENCE = 3 * 255**2
 
@@ -38,7 +39,7 @@ class WMF(Method):
 
     def __post_init__(self) -> None:
         if self.radius_px < 0 or not self.sigma > 0:
-            raise ValueError(
+            raise InputError(
                 f"the weighted median needs a radius of at least 0 and a positive sigma, got {self.radius_px} "
                 f"and {self.sigma}"
             )

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stereoforge_kit.errors import InputError
+
 
 @dataclass(frozen=True)
 class ConfidenceShape:
@@ -25,7 +27,7 @@ class ConfidenceShape:
         for name in ("temperature", "power"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"the confidence's {name} must be positive, got {value}")
+                raise InputError(f"the confidence's {name} must be positive, got {value}")
 
     def apply(self, confidence: NDArray[np.float32]) -> NDArray[np.float32]:
         """Shape (H, W) confidences in [0, 1]; 0 stays 0, 1 stays 1."""

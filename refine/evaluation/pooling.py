@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from refine.methods.base import EvaluationFrame, MethodOutput
 from refine.metrics import D1Pool, ErrorPool, GradientPool, KittiD1, forward_gradient, smooth_mask
+from stereoforge_kit.errors import InputError
 
 REGIONS = ("all", "occ")
 """All: every pixel with ground truth. Occ: those hidden from, or outside, the other view."""
@@ -105,7 +106,7 @@ class MethodPool:
         elif output.disparity is not None:
             gradient = forward_gradient(output.disparity)
         else:
-            raise ValueError("a method gave neither a disparity nor a gradient")
+            raise InputError("a method gave neither a disparity nor a gradient")
         truth = forward_gradient(frame.truth)
         self.masked.add(gradient, truth, smooth_mask(truth, self.gradient_threshold))
         self.everywhere.add(gradient, truth)

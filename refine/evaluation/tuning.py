@@ -18,6 +18,7 @@ from typing import Any, Literal
 
 from refine.methods.base import EvaluationFrame, Method
 from refine.metrics import ErrorPool, GradientPool, forward_gradient, smooth_mask
+from stereoforge_kit.errors import InputError
 
 Objective = Literal["balanced", "bad", "epe", "gradient"]
 """Error relative to the initial disparity's: the mean of the three, bad pixels, end-point error, gradient error."""
@@ -78,7 +79,7 @@ def measure(method: Method, frames: Sequence[EvaluationFrame], bad_threshold: fl
     for frame in frames:
         disparity = method.run(frame).disparity
         if disparity is None:
-            raise ValueError(
+            raise InputError(
                 f"{method.name} gives no disparity, so its parameters cannot be validated by one"
             )
         truth = forward_gradient(frame.truth)

@@ -12,6 +12,7 @@ from sklearn.ensemble import RandomForestClassifier
 
 from refine.forest.features import confidence_features
 from refine.forest.forest import LEAF, Forest
+from stereoforge_kit.errors import InputError
 
 Map = NDArray[np.float32]
 
@@ -62,7 +63,7 @@ def grow_forest(frames: Iterable[ForestFrame], count: int, config: ForestConfig,
         labels.append(right.ravel()[drawn])
     answers = np.concatenate(labels) if labels else np.empty(0, bool)
     if len(np.unique(answers)) < 2:
-        raise ValueError("a confidence can be learned only from frames with right and wrong pixels")
+        raise InputError("a confidence can be learned only from frames with right and wrong pixels")
     grown = RandomForestClassifier(
         n_estimators=config.trees,
         min_samples_leaf=config.leaf_samples,

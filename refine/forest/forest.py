@@ -14,6 +14,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from refine.forest.features import FEATURES, confidence_features
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_bytes
 
 FORMAT = "1"
@@ -21,7 +22,7 @@ LEAF = -1
 """In place of a feature's number."""
 
 
-class ForestError(ValueError):
+class ForestError(InputError):
     """A file is no forest, or not one for these features."""
 
 

@@ -13,6 +13,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from stereoforge_kit.errors import InputError
+
 INPUTS_IN_WORDS = {
     "confidence": "a confidence",
     "gradient": "predicted gradients",
@@ -75,7 +77,7 @@ class EvaluationFrame:
             shapes[f"confidence {name!r}"] = (values.shape, size)
         for name, (got, expected) in shapes.items():
             if got != expected:
-                raise ValueError(f"frame {self.name}: {name} has shape {got}, expected {expected}")
+                raise InputError(f"frame {self.name}: {name} has shape {got}, expected {expected}")
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from refine.energy.system import Form
 from refine.methods.base import EvaluationFrame, Method, MethodOutput
 from refine.mrf.robust import check_scale, curvature_factor, solve_robust
 from refine.mrf.solve import DEFAULT_TOLERANCE, MRFSolution, SolverName, solve_mrf
+from stereoforge_kit.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Ours(Method):
             return
         check_scale(self.gradient_scale)
         if self.form != "exact":
-            raise ValueError(
+            raise InputError(
                 "the paper's form of the MRF has a quadratic gradient term, so no gradient_scale"
             )
 
@@ -111,7 +112,7 @@ def mrf_inputs(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
     """What a method with the MRF's inputs takes of a frame; ValueError if it lacks one of them."""
     if frame.confidence is None or frame.gradient is None:
-        raise ValueError(
+        raise InputError(
             f"{method.label} needs {method.lacks(frame)}, which frame {frame.name} comes without"
         )
     return frame.disparity, frame.confidence, frame.gradient, frame.image

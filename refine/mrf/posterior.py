@@ -20,6 +20,7 @@ from refine.mrf.solve import checked_problem
 from refine.solvers.linear import SolverError
 from refine.solvers.multigrid import GivenSystem
 from refine.solvers.stencils import Couplings, couplings_of, crop, data_weight
+from stereoforge_kit.errors import InputError
 
 TOLERANCE = 1e-3
 """Relative residual of each sample's solve: far below the sampling error."""
@@ -58,7 +59,7 @@ def posterior_deviation(
         refine.SolverError: If the system is singular or a solve does not converge.
     """
     if samples < 1:
-        raise ValueError(f"samples must be at least 1, got {samples}")
+        raise InputError(f"samples must be at least 1, got {samples}")
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
     problem = replace(problem, gradient_factor=gradient_factor)
     parts = couplings_of(problem, data_weight(problem))

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from refine.energy.affinity import Floats
 from refine.energy.parameters import MRFParameters
 from refine.mrf.solve import DEFAULT_TOLERANCE, MRFSolution, SolverName, checked_problem, solve_problem
+from stereoforge_kit.errors import InputError
 
 DEFAULT_REWEIGHTINGS = 4
 WEIGHING_TOLERANCE = 1e-4
@@ -63,7 +64,7 @@ def solve_robust(
     """
     check_scale(scale)
     if reweightings < 0:
-        raise ValueError(f"there cannot be {reweightings} reweightings")
+        raise InputError(f"there cannot be {reweightings} reweightings")
     began = time.perf_counter()
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
     tolerances = [max(tolerance, WEIGHING_TOLERANCE)] * reweightings + [tolerance]
@@ -81,7 +82,7 @@ def solve_robust(
 def check_scale(scale: float) -> None:
     """Raises ValueError unless it can be a scale of the gradient term."""
     if not (np.isfinite(scale) and scale > 0):
-        raise ValueError(f"the gradient term's scale must be positive, got {scale}")
+        raise InputError(f"the gradient term's scale must be positive, got {scale}")
 
 
 def gradient_factor(disparity: Floats, gradient: Floats, scale: float) -> Floats:

@@ -44,6 +44,7 @@ from refine.report.tables import (
     refined_confidence_table,
     summary_tiles,
 )
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_bytes, write_text
 from stereoforge_kit.viewing import render_page
 from stereoforge_kit.viewing.html import encoded
@@ -122,7 +123,7 @@ def write_report(
         ValueError: If there is no set, or two share a name.
     """
     if not sets or len({each.name for each in sets}) != len(sets):
-        raise ValueError("a report needs at least one set, and no two of one name")
+        raise InputError("a report needs at least one set, and no two of one name")
     files = ReportFiles(out / "report.html", out / "results.csv", out / "results.json", out / "figures")
     about = {"title": context.title, **context.facts, "limits": list(context.limits)}
     views = [_set_view(each, index, context.bootstrap_seed) for index, each in enumerate(sets)]

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from refine.energy.affinity import Floats
 from refine.energy.parameters import MRFParameters
 from refine.energy.system import Form, MRFSystem, build_system
+from stereoforge_kit.errors import UserError
 
 
-class SolverError(RuntimeError):
+class SolverError(UserError):
     """The linear system could not be solved."""
 
 

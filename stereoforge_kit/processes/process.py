@@ -27,6 +27,7 @@ from multiprocessing.reduction import DupFd
 from pathlib import Path
 from typing import Any, Literal
 
+from stereoforge_kit.errors import UserError
 from stereoforge_kit.processes.limits import Limits
 
 POLL_S = 0.1
@@ -45,7 +46,7 @@ _SIGNALS_FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 _capture: Path | None = None
 
 
-class WorkerError(RuntimeError):
+class WorkerError(UserError):
     """A worker process ended, or was ended, before it gave a result; the message is one sentence."""
 
     def __init__(self, kind: FailureKind, sentence: str) -> None:

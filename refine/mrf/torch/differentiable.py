@@ -32,6 +32,7 @@ from refine.solvers import SolverError
 from refine.solvers.multigrid import GivenSystem
 from refine.solvers.stencils import Couplings, crop
 from refine.solvers.stencils import pad as padded
+from stereoforge_kit.errors import InputError
 
 Map = Callable[[Tensor], Tensor]
 
@@ -109,12 +110,12 @@ def refine_batch(
     """
     batch, height, width = disparity.shape
     if confidence.shape != disparity.shape or gradient.shape != (batch, 2, height, width):
-        raise ValueError(
+        raise InputError(
             f"disparity {tuple(disparity.shape)}, confidence {tuple(confidence.shape)} and gradient "
             f"{tuple(gradient.shape)} do not fit; expected (B, H, W), (B, H, W), (B, 2, H, W)"
         )
     if not disparity.isfinite().all():
-        raise ValueError("disparity must be finite; fill what is missing and give it confidence 0")
+        raise InputError("disparity must be finite; fill what is missing and give it confidence 0")
     tau = confidence.clamp(min=parameters.confidence_floor)
     known = gradient.isfinite()
     wanted = torch.where(known, gradient, torch.zeros_like(gradient))
