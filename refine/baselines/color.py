@@ -14,9 +14,8 @@ import numpy as np
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.energy.parameters import MRFParameters
 from refine.energy.system import Form
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
-from refine.methods.ours import Ours
-from refine.mrf.solve import SolverName
+from refine.method import EvaluationFrame, Method, MethodOutput, mrf_inputs
+from refine.mrf.solve import SolverName, solve_mrf
 
 _DIRECT_UP_TO_PIXELS = 200_000
 
@@ -62,5 +61,7 @@ class Color(Method):
         # The multigrid cycle is made for the gradient term's couplings; without them it takes hundreds of iterations,
         # and a factorisation of a smaller image less than half of their time.
         solver: SolverName = "direct" if frame.disparity.size <= _DIRECT_UP_TO_PIXELS else "auto"
-        method = Ours(parameters, self.shape, self.form, solver, self.tolerance)
-        return method.run(replace(frame, gradient=level))
+        disparity, confidence, _, image = mrf_inputs(self, replace(frame, gradient=level))
+        shaped = self.shape.apply(confidence)
+        solution = solve_mrf(disparity, shaped, level, image, parameters, self.form, solver, self.tolerance)
+        return MethodOutput(disparity=solution.disparity.astype(np.float32))

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.matching import fill_nearest
 

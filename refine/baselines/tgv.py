@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from refine.energy.confidence_shape import ConfidenceShape
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.matching import fill_nearest
 

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 from stereoforge_kit.errors import InputError
 
 LARGEST_SQUARED_DIFFERENCE = 3 * 255**2

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from refine.evaluation.pooling import MethodPool, MethodScore
-from refine.methods.base import EvaluationFrame, Method
-from refine.methods.registry import default_methods
+from refine.method import EvaluationFrame, Method
 from refine.metrics import SparsificationCurve, bad_pixel_rate, optimal_auc, sparsification_curve
+from refine.registry import default_methods
 from stereoforge_kit.errors import InputError
 
 __all__ = [

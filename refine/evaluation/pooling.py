@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from refine.methods.base import EvaluationFrame, MethodOutput
+from refine.method import EvaluationFrame, MethodOutput
 from refine.metrics import D1Pool, ErrorPool, GradientPool, KittiD1, forward_gradient, smooth_mask
 from stereoforge_kit.errors import InputError
 

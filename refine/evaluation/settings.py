@@ -16,10 +16,10 @@ from typing import Any
 import cattrs
 
 from refine.evaluation.tuning import Trial, TunedMethod
-from refine.methods.base import Method
+from refine.method import Method
 from refine.methods.ours import Ours
 from refine.methods.ours_quadratic import OursQuadratic
-from refine.methods.registry import default_methods, known_methods
+from refine.registry import default_methods, known_methods
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_text
 

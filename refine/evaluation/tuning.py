@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Literal
 
-from refine.methods.base import EvaluationFrame, Method
+from refine.method import EvaluationFrame, Method
 from refine.metrics import ErrorPool, GradientPool, forward_gradient, smooth_mask
 from stereoforge_kit.errors import InputError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 
 
 @dataclass(frozen=True)

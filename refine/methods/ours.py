@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.energy.parameters import MRFParameters
 from refine.energy.system import Form
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput, mrf_inputs
 from refine.mrf.robust import check_scale, curvature_factor, solve_robust
 from refine.mrf.solve import DEFAULT_TOLERANCE, MRFSolution, SolverName, solve_mrf
 from stereoforge_kit.errors import InputError
@@ -105,14 +105,3 @@ class Ours(Method):
         if self.gradient_scale is None:
             return solve_mrf(*inputs, self.form, self.solver, self.tolerance)
         return solve_robust(*inputs, self.gradient_scale, solver=self.solver, tolerance=self.tolerance)
-
-
-def mrf_inputs(
-    method: Method, frame: EvaluationFrame
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
-    """What a method with the MRF's inputs takes of a frame; ValueError if it lacks one of them."""
-    if frame.confidence is None or frame.gradient is None:
-        raise InputError(
-            f"{method.label} needs {method.lacks(frame)}, which frame {frame.name} comes without"
-        )
-    return frame.disparity, frame.confidence, frame.gradient, frame.image

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 from refine.methods.ours import Ours
 
 

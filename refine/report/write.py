@@ -16,8 +16,8 @@ from refine.evaluation.results import EvaluatedSet, mean_curves, results_csv, re
 from refine.report.figures import (
     PanelView,
     auc_figure,
+    close_up_picture,
     curve_figure,
-    lens_picture,
     panel_picture,
     panel_view,
 )
@@ -218,5 +218,5 @@ def _figure_files(view: SetView, compact: bool) -> Iterator[tuple[str, bytes]]:
     for number, panel in enumerate((*view.panels, *view.worst), start=1):
         if not compact:
             yield f"{panels}-{number}.png", encoded(panel_picture(panel))
-        if panel.lens is not None:
-            yield f"fig1-{number}.png", encoded(lens_picture(panel.lens))
+        if panel.close_up is not None:
+            yield f"fig1-{number}.png", encoded(close_up_picture(panel.close_up))

@@ -50,7 +50,7 @@ class Tune:
         from rich.table import Table
 
         from datagen.sources.registry import open_source
-        from refine.methods.registry import default_methods
+        from refine.registry import default_methods
         from stereoforge.pipelines.parameter_search import Tuning, describe, shown_values, validation_frames
         from stereoforge.pipelines.prediction import (
             network_digests,

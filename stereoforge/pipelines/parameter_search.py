@@ -25,8 +25,8 @@ from refine.evaluation.tuning import (
     usual_trials,
     value_at,
 )
-from refine.methods.base import Method
-from refine.methods.registry import known_methods, table_order
+from refine.method import Method
+from refine.registry import known_methods, table_order
 from stereoforge.errors import CommandError
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.progress import console, progress_bar

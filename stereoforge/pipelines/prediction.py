@@ -19,7 +19,7 @@ from refine.evaluation.evaluate import EvaluationFrame
 from refine.evaluation.settings import Settings, read_settings
 from refine.forest import Forest, load_forest
 from refine.heuristic_inputs import consistency_confidence, local_slopes
-from refine.methods.base import Method
+from refine.method import Method
 from stereoforge.errors import CommandError
 from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
 from training.prediction.predictor import FreePredictor, Prediction, StereoPredictor

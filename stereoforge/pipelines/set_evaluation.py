@@ -13,7 +13,7 @@ from datagen.sources.stereo_frame import StereoFrame
 from refine.evaluation.evaluate import EvaluationOptions, evaluate
 from refine.evaluation.results import EvaluatedSet
 from refine.evaluation.settings import Settings
-from refine.methods.base import Method
+from refine.method import Method
 from refine.report.write import ReportContext, ReportFiles, write_report
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.progress import progress_bar

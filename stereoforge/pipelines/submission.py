@@ -14,7 +14,7 @@ from datagen.formats import write_png
 from datagen.formats.picture import read_picture
 from datagen.sources.registry import DataSource, open_source
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
-from refine.methods.base import Method
+from refine.method import Method
 from stereoforge.errors import UsageError
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.progress import progress_bar

@@ -25,7 +25,7 @@ from refine.energy.confidence_shape import ConfidenceShape
 from refine.evaluation.evaluate import EvaluationFrame, evaluate
 from refine.methods.ours import Ours
 from refine.methods.ours_conf_gt import OursConfGT
-from refine.methods.registry import default_methods, known_methods
+from refine.registry import default_methods, known_methods
 from stereoforge_kit.matching import SGBMParameters
 from tests.refine.oracles import dense_minimiser
 from tests.refine.worlds import random_problem, toy_frame

@@ -23,7 +23,7 @@ from datagen import StereoDataset
 from datagen.formats import read_pfm
 from refine.evaluation.settings import read_settings
 from refine.evaluation.tuning import measure
-from refine.methods.registry import known_methods
+from refine.registry import known_methods
 from stereoforge.cli import main
 from stereoforge.commands import COMMANDS, command_class, command_summary
 from stereoforge.errors import UsageError

@@ -14,7 +14,7 @@ from itertools import chain
 
 import refine.baselines
 import refine.methods
-from refine.methods.base import Method
+from refine.method import Method
 from stereoforge_kit.errors import InputError
 
 PAPER_FIRST = ("regressor", "regressor_f", "gradnet", "sgbm", "wmf", "color", "tgv", "fbs", "grad")

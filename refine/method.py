@@ -1,6 +1,6 @@
 """What an evaluation compares: frames in, disparities (or gradients) out, one class a row of the tables.
 
-`refine.methods.registry` finds the classes.
+`refine.registry` finds the classes.
 """
 
 from __future__ import annotations
@@ -127,3 +127,17 @@ class Method(ABC):
     def lacks(self, frame: EvaluationFrame) -> str:
         """The same in a reader's words, such as "a confidence and predicted gradients"; empty if it has them all."""
         return " and ".join(INPUTS_IN_WORDS[name] for name in self.missing(frame))
+
+
+def mrf_inputs(
+    method: Method, frame: EvaluationFrame
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
+    """The disparity (H, W), confidence (H, W), gradient (H, W, 2) and image (H, W, 3) of a frame.
+
+    Raises InputError if the frame lacks one of them.
+    """
+    if frame.confidence is None or frame.gradient is None:
+        raise InputError(
+            f"{method.label} needs {method.lacks(frame)}, which frame {frame.name} comes without"
+        )
+    return frame.disparity, frame.confidence, frame.gradient, frame.image
