@@ -1,4 +1,4 @@
-"""What a command answers when it cannot do what was asked: one sentence and an exit code."""
+"""Errors of commands: one sentence and an exit code."""
 
 from __future__ import annotations
 

@@ -55,6 +55,7 @@ class Color(Method):
     that no measure shows."""
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Refine with the data and colour terms alone."""
         parameters = MRFParameters(0.0, self.beta, self.sigma_r, self.confidence_floor)
         # With alpha = 0 the gradient counts for nothing, whatever it is.
         level = np.zeros((*frame.disparity.shape, 2), np.float32)

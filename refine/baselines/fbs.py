@@ -1,4 +1,4 @@
-"""The fast bilateral solver: disparities alike wherever place and colour are alike.
+"""The fast bilateral solver: pixels close in position and colour get similar disparities.
 
 J. T. Barron, B. Poole, "The Fast Bilateral Solver", ECCV 2016; the simplified grid of J. T. Barron, A. Adams,
 Y. Shih, C. Hernandez, "Fast Bilateral-Space Stereo for Synthetic Defocus", CVPR 2015.
@@ -63,6 +63,7 @@ class FBS(Method):
                 raise InputError(f"the bilateral solver's {name} must be positive, got {value}")
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Filter the frame's initial disparity, weighted by its confidence."""
         assert frame.confidence is not None
         unknown = np.isnan(frame.disparity)
         trust = np.where(unknown, 0, frame.confidence).astype(np.float64)

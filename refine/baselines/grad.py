@@ -36,6 +36,7 @@ class Grad(Method):
     shape: ConfidenceShape = field(default_factory=ConfidenceShape)
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Refine with the data and gradient terms alone."""
         parameters = MRFParameters(self.alpha, 0.0, self.sigma_r, self.confidence_floor)
         disparity, confidence, gradient, image = mrf_inputs(self, frame)
         solution = solve_mrf(disparity, self.shape.apply(confidence), gradient, image, parameters)

@@ -1,4 +1,4 @@
-"""Semi-global block matching: the rival that never learned anything."""
+"""Semi-global block matching, the rival without learning."""
 
 from __future__ import annotations
 
@@ -31,5 +31,6 @@ class SGBM(Method):
     parameters: SGBMParameters = field(default_factory=SGBMParameters)
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Match the pair, (H, W) in pixels."""
         assert frame.right is not None
         return MethodOutput(fill_background(match_sgbm(frame.image, frame.right, self.parameters)))

@@ -74,6 +74,7 @@ class TGV(Method):
             raise InputError(f"TGV's tensor_strength must be at least 0, got {self.tensor_strength}")
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Minimise the energy from the frame's initial disparity, weighted by its confidence."""
         assert frame.confidence is not None
         trust = np.where(np.isnan(frame.disparity), 0, self.shape.apply(frame.confidence))
         disparity, _ = self.solve(fill_nearest(frame.disparity), trust.astype(np.float32), frame.image)

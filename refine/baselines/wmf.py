@@ -1,4 +1,4 @@
-"""Weighted median filter: the common way to clean a disparity map along image edges.
+"""Weighted median filter guided by the image.
 
 Z. Ma, K. He, Y. Wei, J. Sun, E. Wu, "Constant time weighted median filtering for stereo matching and beyond", ICCV
 2013; Q. Zhang, L. Xu, J. Jia, "100+ times faster weighted median filter (WMF)", CVPR 2014.
@@ -45,6 +45,7 @@ class WMF(Method):
             )
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Filter the frame's initial disparity."""
         return MethodOutput(weighted_median(frame.disparity, frame.image, self.radius_px, self.sigma))
 
 

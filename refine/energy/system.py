@@ -102,7 +102,7 @@ def build_system(
     form: Form,
     gradient_factor: Floats | None = None,
 ) -> MRFSystem:
-    """Put a refinement problem into equations (shapes as for `refine.refine_disparity`, not checked here).
+    """Build the linear system of a refinement problem (shapes as for `refine.refine_disparity`, not checked here).
 
     `gradient_factor`, (H, W, 2), multiplies the weights of the gradient terms.
     """

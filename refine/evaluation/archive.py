@@ -1,4 +1,4 @@
-"""A whole evaluation on disk and back: long studies keep what they have finished.
+"""Evaluations on disk, so that long studies keep what they have finished.
 
 `evaluation.json` holds the records, `evaluation.npz` their arrays, which the JSON refers to by name. Reading runs no
 code: the JSON is structured into typed records, and the arrays are read without pickle.
@@ -23,11 +23,6 @@ from stereoforge_kit.files import write_bytes, write_text
 FORMAT = 1
 RECORDS = "evaluation.json"
 ARRAYS = "evaluation.npz"
-
-
-def has_evaluation(folder: Path) -> bool:
-    """Whether a whole evaluation is there: its records are written last."""
-    return (folder / RECORDS).is_file()
 
 
 def write_evaluation(folder: Path, evaluated: EvaluatedSet) -> None:

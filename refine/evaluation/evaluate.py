@@ -97,7 +97,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What came out of `evaluate`."""
+    """The result of `evaluate`."""
 
     options: EvaluationOptions
     labels: dict[str, str]

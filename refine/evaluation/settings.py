@@ -40,7 +40,7 @@ class Settings:
     """What the parameters were validated on, and how."""
 
     def method(self, name: str) -> Method:
-        """The named method, with validated parameters if there are any; raises ValueError if there is none such."""
+        """The named method, with validated parameters if there are any; raises InputError if there is none."""
         return self.methods[name] if name in self.methods else default_methods((name,))[0]
 
     @property
@@ -63,7 +63,7 @@ class Settings:
 
 
 def write_settings(path: Path, tuned: Mapping[str, TunedMethod], about: Mapping[str, Any]) -> None:
-    """Write what was found, in one step."""
+    """Write the file of parameters in one step."""
     document = {
         "format": FORMAT,
         "about": dict(about),
@@ -77,7 +77,8 @@ def read_settings(path: Path) -> Settings:
     """Read a file of parameters.
 
     Raises:
-        ValueError: If it is missing, damaged, of another version, or sets what there is not; names the file.
+        InputError: If it is missing, damaged, of another version, or sets a parameter that does not exist. The message
+            names the file.
     """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Choosing a method's parameters on frames with ground truth: a coordinate search over short lists of values.
+"""Choose a method's parameters on frames with ground truth: a coordinate search over short lists of values.
 
 Each method names its parameters and their values in order (`Method.search`). The search starts from the defaults and
 takes the parameters in turn: it moves along a parameter's values, up and else down, as long as the objective falls,
@@ -108,7 +108,7 @@ def tune_method(
 
     Args:
         kind: The method; its `search` may be empty, and then its defaults are tried only.
-        evaluate: The objective of a setting, to be made small.
+        evaluate: The objective of a setting, which is minimised.
         known: Trials of an earlier search with the same `evaluate`, which are not repeated.
         on_trial: Called after each new trial.
     """

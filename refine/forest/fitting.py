@@ -1,4 +1,4 @@
-"""Growing the forest with scikit-learn."""
+"""Fit the forest with scikit-learn."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Map = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class ForestConfig:
-    """How the forest grows. Park and Yoon's is not published; 50 trees are what replications of its kind use."""
+    """Size of the forest. Park and Yoon's code is not published; replications use 50 trees."""
 
     trees: int = 50
     samples: int = 400_000
@@ -34,7 +34,7 @@ class ForestConfig:
 
 @dataclass(frozen=True)
 class ForestFrame:
-    """What the forest learns from in a frame: (H, W) maps and the (H, W, 3) image."""
+    """One training frame of the forest: (H, W) maps and the (H, W, 3) image."""
 
     image: NDArray[np.uint8]
     truth: Map
@@ -50,7 +50,7 @@ def grow_forest(frames: Iterable[ForestFrame], count: int, config: ForestConfig,
         count: How many they are, so that each gives its share of the samples.
 
     Raises:
-        ValueError: If no pixel has ground truth, or all of them are right, or all wrong.
+        InputError: If no pixel has ground truth, or all of them are right, or all wrong.
     """
     rng = np.random.default_rng(seed)
     features, labels = [], []

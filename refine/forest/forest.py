@@ -1,4 +1,4 @@
-"""A random forest as plain arrays: evaluated here, stored without pickle, so that reading one runs no code."""
+"""A random forest as plain arrays, evaluated here and stored without pickle, so that reading one runs no code."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEAF = -1
 
 
 class ForestError(InputError):
-    """A file is no forest, or not one for these features."""
+    """A file holds no forest, or one for other features."""
 
 
 @dataclass(frozen=True)

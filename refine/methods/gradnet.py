@@ -1,4 +1,4 @@
-"""The gradients that guide the refinement, measured by themselves (the paper's Table 1)."""
+"""GradNet's gradients by themselves (the paper's Table 1)."""
 
 from __future__ import annotations
 
@@ -17,4 +17,5 @@ class GradNet(Method):
     needs: ClassVar[frozenset[str]] = frozenset({"gradient"})
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Hand on the predicted gradient, (H, W, 2) in pixels per pixel."""
         return MethodOutput(gradient=frame.gradient, seconds=frame.seconds.get("gradient", 0.0))

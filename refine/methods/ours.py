@@ -21,8 +21,8 @@ from stereoforge_kit.errors import InputError
 class Ours(Method):
     """The MRF with ConfNet's confidence and GradNet's gradient; the defaults are the paper's.
 
-    Validation may choose the shape of the gradient term too: quadratic as the paper's (`ours_quadratic` is that
-    one's row), or robust (`refine.mrf.robust`), so that disparities may step where the image does not.
+    Validation also chooses the penalty of the gradient term: quadratic as in the paper (`ours_quadratic` is that row),
+    or robust (`refine.mrf.robust`), so that disparities may step where the image does not.
     """
 
     name: ClassVar[str] = "ours"
@@ -62,11 +62,12 @@ class Ours(Method):
             )
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Refine the frame's initial disparity. Raises InputError for a frame without confidence or gradient."""
         solution = self.solve(*mrf_inputs(self, frame))
         return MethodOutput(disparity=solution.disparity.astype(np.float32))
 
     def deviation(self, frame: EvaluationFrame, samples: int) -> NDArray[np.float32]:
-        """The posterior's standard deviation in pixels, of the exact form; sampling takes a solve each."""
+        """Standard deviation (H, W) of the posterior of the exact form, in pixels. Each sample takes one solve."""
         return self.sample(*mrf_inputs(self, frame), samples)
 
     def sample(

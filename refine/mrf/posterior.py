@@ -1,4 +1,4 @@
-"""How sure the MRF is of each refined disparity.
+"""The posterior uncertainty of each refined disparity.
 
 The energy E is quadratic, so exp(-E) is a Gaussian over disparity maps with the refined one as its mean and
 (2 A)^-1 as its covariance. Samples of it cost one solve each (Papandreou and Yuille, "Gaussian sampling by
@@ -38,7 +38,8 @@ def posterior_deviation(
 ) -> NDArray[np.float32]:
     """Standard deviation of each refined disparity under the MRF's own Gaussian, exact form.
 
-    In pixels if the energy is taken at its word; its order, least sure last, is what it is good for.
+    It is in pixels if the energy is taken as a log-likelihood. Use its order rather than its size: it tells which
+    disparities are least certain.
 
     Args:
         disparity: As for `refine.refine_disparity`, like the next four.

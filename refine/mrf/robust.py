@@ -1,4 +1,4 @@
-"""The MRF with a gradient term that lets a few differences be as large as they want to be.
+"""The MRF with a robust gradient term, which tolerates a few large differences.
 
 The paper's gradient term is quadratic: where the disparity steps and the image has no edge to say so, one step of 20 px
 costs what 400 steps of 1 px do, so the solution smears it, and alpha cannot be large. Here the term is Charbonnier's,
@@ -80,7 +80,7 @@ def solve_robust(
 
 
 def check_scale(scale: float) -> None:
-    """Raises ValueError unless it can be a scale of the gradient term."""
+    """Raise InputError unless the value can be a scale of the gradient term: finite and positive."""
     if not (np.isfinite(scale) and scale > 0):
         raise InputError(f"the gradient term's scale must be positive, got {scale}")
 

@@ -67,8 +67,7 @@ def refine_disparity(
     tolerance: float = DEFAULT_TOLERANCE,
     x0: ArrayLike | None = None,
 ) -> NDArray[np.float32]:
-    """Refine a disparity map so that it keeps what is confident and follows the predicted gradients
-    elsewhere.
+    """Refine a disparity map: keep confident disparities, follow the predicted gradients elsewhere.
 
     Args:
         disparity: (H, W) initial disparity in pixels. NaN, where there is none, counts as the nearest known
@@ -88,7 +87,7 @@ def refine_disparity(
         (H, W) float32 refined disparity, finite everywhere.
 
     Raises:
-        ValueError: If a shape, type or range is wrong, or no pixel has a disparity.
+        InputError: If a shape, type or range is wrong, or no pixel has a disparity. It is a ValueError.
         refine.SolverError: If the system is singular: with a `confidence_floor` of 0, a region without
         confidence
             that nothing ties to its surroundings.
@@ -109,7 +108,7 @@ def solve_mrf(
     tolerance: float = DEFAULT_TOLERANCE,
     x0: ArrayLike | None = None,
 ) -> MRFSolution:
-    """`refine_disparity` with the result in float64 and an account of how it was reached."""
+    """Refine as `refine_disparity` does; return the disparity in float64 and how it was computed."""
     began = time.perf_counter()
     if form not in ("exact", "paper"):
         raise InputError(f"the MRF's form is 'exact' or 'paper', not {form!r}")

@@ -32,7 +32,7 @@ Map = NDArray[np.float32]
 
 PANEL_LONGEST = 960
 """Pictures of larger frames are shrunk to this, so that a report stays a few megabytes."""
-LENS_SIZE = (64, 96)
+CLOSE_UP_SIZE = (64, 96)
 CLOSE_UP_ZOOM = 4
 
 
@@ -166,10 +166,10 @@ def _close_up(panel: Panel, refined: NDArray[np.float32], failure: bool) -> Clos
     frame = panel.frame
     if failure:
         reason = "the depth boundary where the result is worst"
-        window = worst_boundary(refined, frame.truth, LENS_SIZE)
+        window = worst_boundary(refined, frame.truth, CLOSE_UP_SIZE)
     else:
         reason = "the depth boundary where refinement changes most for the better"
-        window = most_improved_boundary(frame.disparity, refined, frame.truth, LENS_SIZE)
+        window = most_improved_boundary(frame.disparity, refined, frame.truth, CLOSE_UP_SIZE)
     if window is None:
         return None
     truth = frame.truth[window]

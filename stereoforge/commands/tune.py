@@ -42,6 +42,7 @@ class Tune:
     """What the networks run on: cpu, cuda, ..."""
 
     def run(self) -> None:
+        """Search the parameters and write them into the run folder."""
         if self.frames < 1:
             raise UsageError(f"--frames must be at least 1, got {self.frames}")
         if not self.data:

@@ -1,4 +1,4 @@
-"""Reading the small languages of flag values."""
+"""Parse the values of flags."""
 
 from __future__ import annotations
 

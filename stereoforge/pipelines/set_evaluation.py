@@ -1,4 +1,4 @@
-"""Joining data sets, networks and the MRF into evaluations and their report."""
+"""Evaluate networks and methods on data sets, and report it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ KITTI_BAD_PX = 3.0
 
 @dataclass(frozen=True)
 class TestData:
-    """Frames to evaluate on, with what a reader wants to know of them."""
+    """Frames to evaluate on, with the facts that the report shows of them."""
 
     name: str
     frames: Sequence[StereoFrame]

@@ -25,7 +25,7 @@ FOLDER = "disp_0"
 
 
 def find_submission_frames(sources: Sequence[str]) -> list[StereoFrame]:
-    """The frames to be submitted of the one KITTI set among the sources: its testing part, whose truth only the
+    """The frames to be submitted of the one KITTI set among the sources: its testing part, whose ground truth only the
     server has, or, where that is not there, its training part.
 
     Raises UsageError if there is not exactly one such set.

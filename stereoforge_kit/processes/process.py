@@ -1,4 +1,4 @@
-"""One worker process, watched from outside: its time, its memory, its end, and everything it prints.
+"""One worker process, supervised from outside: its time, memory, end and output.
 
 Each worker has a pipe of its own and shares no lock with anyone, so that it can be killed at any moment
 without harm to the others. It dies with the process that started it.
@@ -131,10 +131,12 @@ class WorkerProcess:
 
     @property
     def alive(self) -> bool:
+        """Whether the process takes another call."""
         return self._process.is_alive()
 
     @property
     def pid(self) -> int:
+        """The process's number."""
         assert self._process.pid is not None
         return self._process.pid
 

@@ -113,7 +113,7 @@ def gradient_picture(gradient: ArrayLike, maximum: float = 0.5) -> Picture:
 
 
 def normals_picture(normals: ArrayLike) -> Picture:
-    """Surface normals (H, W, 3), x right, y up, z towards the eye: -1..1 as red, green, blue; the sky dark."""
+    """Surface normals (H, W, 3), x right, y up, z towards the camera: -1..1 as red, green, blue; the sky dark."""
     values = _image(normals, "normals")
     nothing = ~values.any(axis=2, keepdims=True)
     return _rounded(np.where(nothing, 38.0, 127.5 * (values + 1)))
@@ -130,7 +130,7 @@ def index_picture(index: ArrayLike) -> Picture:
 
 
 def anaglyph(left: ArrayLike, right: ArrayLike) -> Picture:
-    """The pair for red-cyan glasses: the left eye's brightness in red, the right eye's green and blue.
+    """The pair for red-cyan glasses: the left view's brightness in red, the right view's green and blue.
 
     (A half-colour anaglyph: a full-colour one makes red things flicker between the eyes.)
     """

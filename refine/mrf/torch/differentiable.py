@@ -47,7 +47,7 @@ _SINGLE = 1e-6
 
 @dataclass(frozen=True)
 class ImageWeights:
-    """What ties pixels together, (B, ...) tensors; as `refine.energy.affinity` computes it, or anything else."""
+    """Affinities of a batch, as `refine.energy.affinity` or a network gives them."""
 
     phi_x: Tensor
     """(B, H, W)."""
