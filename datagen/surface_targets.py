@@ -145,6 +145,8 @@ class ExtraTargets:
         for direction in DIRECTIONS:
             if "disparity_change" in self._kinds:
                 made["disparity_change", direction] = surfaces.disparity_change(direction)
+            if not {"optical_flow", "motion_boundaries"} & set(self._kinds):
+                continue
             flow = surfaces.flow(direction)
             if "optical_flow" in self._kinds:
                 made["optical_flow", direction] = flow

@@ -21,7 +21,7 @@ from datagen.layout import DIRECTIONS, EXTRA_TARGETS, EYES, Direction, Eye, Layo
 from datagen.manifest import file_entry, read_manifest, write_manifest
 from datagen.raycast import SceneRayCaster
 from datagen.scene_geometry import SceneGeometry
-from datagen.surface_targets import STEP, PixelSurfaces
+from datagen.surface_targets import STEP, ExtraTargets, PixelSurfaces
 from datagen.verify import verify_dataset
 from scenes import FAMILIES, Scene
 from scenes.motion import quaternion
@@ -175,6 +175,24 @@ def test_flow_disparity_change_and_normals_have_their_closed_form(
     }
     for name, other in wrong.items():
         assert np.percentile(np.linalg.norm(flow - other, axis=-1)[~rim], 50) > TOLERANCE_PX, name
+
+
+@pytest.mark.parametrize("kinds", [(), *((kind,) for kind in EXTRA_TARGETS), EXTRA_TARGETS])
+def test_only_what_was_asked_for_is_made(kinds: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A target costs nothing where it is not wanted: flow is followed for flow and motion boundaries alone."""
+    followed: list[Direction] = []
+    flow = PixelSurfaces.flow
+
+    def counted(surfaces: PixelSurfaces, direction: Direction) -> NDArray[np.float32]:
+        followed.append(direction)
+        return flow(surfaces, direction)
+
+    monkeypatch.setattr(PixelSurfaces, "flow", counted)
+    caster = SceneRayCaster(SceneGeometry(moving_plane(KINDS["rigid"])))
+    index = caster.cast_all("left", NOW).object_index
+    made = ExtraTargets(caster, kinds).make("left", NOW, index)
+    assert {kind for kind, _ in made} == set(kinds)
+    assert followed == (list(DIRECTIONS) if {"optical_flow", "motion_boundaries"} & set(kinds) else [])
 
 
 def test_points_that_go_behind_the_camera_have_no_flow() -> None:
