@@ -1,0 +1,84 @@
+"""What predictors make of a frame, and how long they are said to take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from datagen.frame import FileFrame, FileFrames
+from refine.baselines.regressor import Regressor
+from refine.baselines.regressor_f import RegressorF
+from stereoforge.evaluation import TestData, evaluate_set
+from stereoforge.prediction import Image, Predictors
+from training.predict import Prediction
+
+SIZE = (12, 20)
+DECODING_S, PREDICTING_S, COMPILING_S = 100.0, 2.0, 1000.0
+
+
+@dataclass
+class Clock:
+    """Time that passes only where something says so."""
+
+    now: float = 0.0
+
+    def after(self, seconds: float, answer: Any) -> Callable[[], Any]:
+        def wait() -> Any:
+            self.now += seconds
+            return answer
+
+        return wait
+
+
+@dataclass
+class Constant:
+    """Predicts 5 px, after compiling at its first frame."""
+
+    clock: Clock
+    compiled: bool = False
+
+    def predict(self, left: Image, right: Image) -> Prediction:  # noqa: ARG002
+        self.clock.now += PREDICTING_S if self.compiled else COMPILING_S
+        self.compiled = True
+        return Prediction(np.full(left.shape[:2], 5, np.float32), None, None)
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr("stereoforge.prediction.time", SimpleNamespace(perf_counter=lambda: clock.now))
+    return clock
+
+
+def slow_frame(clock: Clock, name: str) -> FileFrame:
+    """A frame whose every array takes its time to be read."""
+    image, truth = np.zeros((*SIZE, 3), np.uint8), np.full(SIZE, 6, np.float32)
+    reads = [clock.after(DECODING_S, array) for array in (image, image, truth)]
+    return FileFrame(name, *reads)
+
+
+def predictors(clock: Clock, compiled: bool) -> Predictors:
+    initial: Any = Constant(clock, compiled)
+    fine_tuned: Any = Constant(clock, compiled)
+    return Predictors(initial, fine_tuned)
+
+
+def test_reading_the_pictures_is_not_the_networks_time(clock: Clock) -> None:
+    frame = predictors(clock, compiled=True).frame(slow_frame(clock, "a"))
+    assert clock.now == 3 * DECODING_S + 2 * PREDICTING_S
+    assert frame.seconds == {"disparity": PREDICTING_S, "fine_tuned": PREDICTING_S}
+
+
+def test_compiling_at_the_first_frame_is_not_the_networks_time(clock: Clock) -> None:
+    data = TestData("set", FileFrames([slow_frame(clock, "a"), slow_frame(clock, "b")]), "", "test")
+    scores = evaluate_set(
+        data, predictors(clock, compiled=False), (Regressor(), RegressorF())
+    ).evaluation.scores
+    assert scores["regressor"].seconds == pytest.approx(PREDICTING_S, abs=1.0)
+    assert scores["regressor_f"].seconds == pytest.approx(PREDICTING_S, abs=1.0)
+    assert len(scores) == 2
