@@ -9,7 +9,7 @@ Occlusion is derived from both disparities.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -36,18 +36,24 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
     return disparity
 
 
-def _flying_things(root: Path) -> bool:
+def _flying_things(root: Path, images: str) -> bool:
     return not (root / "recipe.yaml").is_file() and any(
-        (root / folder / part).is_dir() for folder in PASSES.values() for part in PARTS.values()
+        (root / images / part).is_dir() for part in PARTS.values()
     )
 
 
-def _driving(root: Path) -> bool:
-    return any(True for folder in PASSES.values() for _ in root.glob(f"{folder}/*mm_focallength/*/*/left"))
+def _driving(root: Path, images: str) -> bool:
+    return any(True for _ in root.glob(f"{images}/*mm_focallength/*/*/left"))
 
 
-def _monkaa(root: Path) -> bool:
-    return any(True for folder in PASSES.values() for _ in root.glob(f"{folder}/*/left"))
+def _monkaa(root: Path, images: str) -> bool:
+    return any(True for _ in root.glob(f"{images}/*/left"))
+
+
+def _recognises(root: Path, render_pass: str, has_images: Callable[[Path, str], bool]) -> bool:
+    """Whether the folder has a pass's images; those of the final pass count where there are no clean ones."""
+    passes = [name for name, images in PASSES.items() if has_images(root, images)]
+    return passes[:1] == [render_pass]
 
 
 def _find(root: str, split: str, render_pass: str, pattern: str) -> Sequence[StereoFrame]:
@@ -74,17 +80,16 @@ def _formats() -> Iterator[SourceFormat]:
         ("driving", "SceneFlow Driving", _driving, "*mm_focallength/*/*", ()),
         ("monkaa", "SceneFlow Monkaa", _monkaa, "*", ()),
     )
-    for name, title, recognises, pattern, splits in kinds:
-        yield SourceFormat(
-            name, title, recognises, partial(_find, render_pass="clean", pattern=pattern), splits
-        )
-        yield SourceFormat(
-            f"{name}-final",
-            f"{title} (final pass)",
-            lambda _: False,
-            partial(_find, render_pass="final", pattern=pattern),
-            splits,
-        )
+    for name, title, has_images, pattern, splits in kinds:
+        for render_pass in PASSES:
+            final = render_pass == "final"
+            yield SourceFormat(
+                f"{name}-final" if final else name,
+                f"{title} (final pass)" if final else title,
+                partial(_recognises, render_pass=render_pass, has_images=has_images),
+                partial(_find, render_pass=render_pass, pattern=pattern),
+                splits,
+            )
 
 
 FORMATS = tuple(_formats())

@@ -21,6 +21,7 @@ from datagen.frame import FileFrame, FileFrames, StereoFrame
 from datagen.ground_truth import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.source import SourceFormat
 
+PASSES = ("clean", "final")
 _UNITS = np.array([4, 1 / 64, 1 / 16384], np.float32)
 
 
@@ -47,11 +48,11 @@ def _training(root: Path) -> Path:
     return root / "training" if (root / "training").is_dir() else root
 
 
-def _recognises(root: Path) -> bool:
+def _recognises(root: Path, render_pass: str) -> bool:
+    """Whether the folder has a pass's images; those of the final pass count where there are no clean ones."""
     folder = _training(root)
-    return (folder / "disparities").is_dir() and any(
-        (folder / f"{p}_left").is_dir() for p in ("clean", "final")
-    )
+    passes = [name for name in PASSES if (folder / f"{name}_left").is_dir()]
+    return (folder / "disparities").is_dir() and passes[:1] == [render_pass]
 
 
 def _find(root: str, split: str, render_pass: str) -> Sequence[StereoFrame]:  # noqa: ARG001
@@ -72,9 +73,12 @@ def _frames(folder: Path, render_pass: str) -> Iterator[FileFrame]:
         )
 
 
-FORMATS = (
-    SourceFormat("sintel", "MPI Sintel", _recognises, partial(_find, render_pass="clean")),
+FORMATS = tuple(
     SourceFormat(
-        "sintel-final", "MPI Sintel (final pass)", lambda _: False, partial(_find, render_pass="final")
-    ),
+        name, title, partial(_recognises, render_pass=render_pass), partial(_find, render_pass=render_pass)
+    )
+    for name, title, render_pass in (
+        ("sintel", "MPI Sintel", "clean"),
+        ("sintel-final", "MPI Sintel (final pass)", "final"),
+    )
 )

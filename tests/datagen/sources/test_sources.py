@@ -1,5 +1,6 @@
 """Every reader on files in the published encoding: values, signs, rows, holes, labels; and the choice of reader."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -90,6 +91,31 @@ def test_final_passes(tmp_path: Path) -> None:
     w = published.flyingthings3d(tmp_path)
     frame = open_source(f"flyingthings3d-final:{tmp_path}").frames("train")[0]
     np.testing.assert_array_equal(frame.right, w.left)
+
+
+@pytest.mark.parametrize("name", ["flyingthings3d", "driving", "monkaa", "sintel"])
+def test_a_tree_with_the_final_pass_alone_is_read_by_it(name: str, tmp_path: Path) -> None:
+    w = SETS[name](tmp_path)
+    for clean in sorted(tmp_path.glob("**/*clean*")):
+        final = clean.with_name(clean.name.replace("clean", "final"))
+        if final.exists():
+            shutil.rmtree(final)
+        clean.rename(final)
+    source = open_source(tmp_path)
+    assert source.format.name == f"{name}-final"
+    frame = source.frames("test")[0]
+    np.testing.assert_array_equal(frame.left, w.left)
+    np.testing.assert_array_equal(frame.right, w.right)
+
+
+def test_a_set_of_ours_with_the_final_pass_alone_is_read_by_it(tmp_path: Path) -> None:
+    """What `render --passes final` leaves, and what it leaves with both passes or before the first scene is done."""
+    (tmp_path / "recipe.yaml").write_text("")
+    assert open_source(tmp_path).format.name == "native"
+    (tmp_path / "frames_finalpass").mkdir()
+    assert open_source(tmp_path).format.name == "native-final"
+    (tmp_path / "frames_cleanpass").mkdir()
+    assert open_source(tmp_path).format.name == "native"
 
 
 def test_sceneflow_errors_of_the_set_are_missing(tmp_path: Path) -> None:
