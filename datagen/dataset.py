@@ -131,6 +131,11 @@ class StereoSample:
         """(H, W) 0 sky, else 1 + index in the scene's objects."""
         return self._object_index("right")
 
+    @property
+    def foreground_left(self) -> NDArray[np.uint16] | None:
+        """None: the object index numbers everything, and none of it is called the foreground."""
+        return None
+
     def view(self, eye: Eye) -> EyeView:
         """Everything of the "left" or "right" eye."""
         if eye not in EYES:

@@ -61,7 +61,12 @@ class StereoFrame(Protocol):
 
     @property
     def object_index_left(self) -> NDArray[np.uint16] | None:
-        """(H, W) 0 background, else a number an object; None where the set has none."""
+        """(H, W) 0 where nothing is hit (sky), else a number an object; None where the set has none."""
+
+    @property
+    def foreground_left(self) -> NDArray[np.uint16] | None:
+        """(H, W) 0 background, else a number a foreground object: KITTI's object map, whose foreground is its cars.
+        None where the set does not tell one from the other."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,7 @@ class FileFrame:
     read_disparity_right: Callable[[], DisparityMap] | None = None
     read_occlusion_left: Callable[[], NDArray[np.uint8]] | None = None
     read_object_index_left: Callable[[], NDArray[np.uint16]] | None = None
+    read_foreground_left: Callable[[], NDArray[np.uint16]] | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -124,6 +130,12 @@ class FileFrame:
         if self.read_object_index_left is None:
             return None
         return self._checked("object index", self.read_object_index_left())
+
+    @cached_property
+    def foreground_left(self) -> NDArray[np.uint16] | None:
+        if self.read_foreground_left is None:
+            return None
+        return self._checked("foreground", self.read_foreground_left())
 
     @cached_property
     def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

@@ -13,7 +13,6 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen import StereoSample
 from datagen.frame import StereoFrame
 from matching import SGBMParameters, fill_background, left_right_consistency, match_both
 from refine.evaluation import EvaluationFrame
@@ -84,11 +83,9 @@ class Predictors:
     def frame(self, sample: StereoFrame) -> EvaluationFrame:
         """One sample with all that is predicted for it, and how long that took.
 
-        Where nobody knows what is occluded, nothing is taken to be. Object maps are KITTI's, cars told from the
-        rest; those of our own sets number everything. Frames of one folder are of one scene.
+        Where nobody knows what is occluded, nothing is taken to be. Frames of one folder are of one scene.
         """
         occlusion = sample.occlusion_left
-        objects = None if isinstance(sample, StereoSample) else sample.object_index_left
         left, right = sample.left, sample.right  # Read here: decoding and hashing are not the networks' time.
         began = time.perf_counter()
         prediction = self.initial.predict(left, right)
@@ -108,7 +105,7 @@ class Predictors:
             gradient=prediction.gradient,
             right=right,
             fine_tuned=fine_tuned,
-            objects=objects,
+            objects=sample.foreground_left,
             scene=sample.name.rpartition("/")[0],
             other_confidences={}
             if self.forest is None

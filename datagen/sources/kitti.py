@@ -63,7 +63,7 @@ def read_labels(all_points: Path, visible_points: Path) -> NDArray[np.uint8]:
     return occlusion_from_mask(disparity, hidden)
 
 
-def read_objects(path: Path) -> NDArray[np.uint16]:
+def read_foreground(path: Path) -> NDArray[np.uint16]:
     """0 background, else a number a car. Raises FormatError."""
     return read_png(path).astype(np.uint16)
 
@@ -93,7 +93,7 @@ def _frames(folder: Path, edition: _Edition) -> Iterator[FileFrame]:
             read_right=partial(read_picture, folder / edition.right / truth.name),
             read_disparity_left=partial(read_disparity, truth),
             read_occlusion_left=partial(read_labels, truth, visible) if visible.is_file() else None,
-            read_object_index_left=partial(read_objects, objects) if objects and objects.is_file() else None,
+            read_foreground_left=partial(read_foreground, objects) if objects and objects.is_file() else None,
         )
 
 

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from datagen import StereoDataset
+from datagen.export import EXPORTERS, ExportOptions
 from datagen.frame import FileFrame, FileFrames
 from refine.baselines.regressor import Regressor
 from refine.baselines.regressor_f import RegressorF
-from stereoforge.evaluation import TestData, evaluate_set
+from refine.paper_tables import paper_tables
+from stereoforge.evaluation import TestData, evaluate_set, open_test_data
 from stereoforge.prediction import Image, Predictors
+from storage import open_tree
+from tests.datagen.analytic_world import write_dataset
 from training.predict import Prediction
 
 SIZE = (12, 20)
@@ -82,3 +89,23 @@ def test_compiling_at_the_first_frame_is_not_the_networks_time(clock: Clock) -> 
     assert scores["regressor"].seconds == pytest.approx(PREDICTING_S, abs=1.0)
     assert scores["regressor_f"].seconds == pytest.approx(PREDICTING_S, abs=1.0)
     assert len(scores) == 2
+
+
+def test_sets_that_number_every_object_have_no_foreground_for_kitti_s_table(
+    tmp_path: Path, clock: Clock
+) -> None:
+    """Our own sets, in folders and in shards; their KITTI exports have one, with no vehicle in it here."""
+    write_dataset(tmp_path / "set", {"test": 2})
+    sets = [StereoDataset(tmp_path / "set", "test")]
+    for name in ("webdataset", "kitti"):
+        EXPORTERS[name](sets, open_tree(tmp_path / name), ExportOptions(), lambda *_: None)
+    shutil.copytree(tmp_path / "kitti/testing", tmp_path / "kitti/training")
+    for name in ("set", "webdataset", "kitti"):
+        (data,) = open_test_data([str(tmp_path / name)], "test")
+        assert (data.frames[0].object_index_left is None) == (name == "kitti")
+        evaluated = evaluate_set(data, predictors(clock, compiled=True), (Regressor(), RegressorF()))
+        assert evaluated.is_kitti == (name == "kitti")
+        assert (6 in [table.number for table in paper_tables(evaluated)]) == (name == "kitti")
+        score = evaluated.evaluation.scores["regressor"].d1
+        assert np.isfinite(score.background)
+        assert np.isnan(score.foreground)

@@ -141,11 +141,18 @@ def test_middlebury_2003_scales_go_with_the_resolution(width: int, scale: int, t
     assert (truth[1:] == 88 / scale).all()
 
 
-def test_kitti_names_objects(tmp_path: Path) -> None:
+def test_kitti_tells_its_cars_from_the_background(tmp_path: Path) -> None:
     w = published.kitti2015(tmp_path)
-    objects = open_source(tmp_path).frames("test")[0].object_index_left
-    assert objects is not None
-    np.testing.assert_array_equal(objects, np.where(w.disparity_left > 10, 3, 0))
+    cars = open_source(tmp_path).frames("test")[0].foreground_left
+    assert cars is not None
+    np.testing.assert_array_equal(cars, np.where(w.disparity_left > 10, 3, 0))
+
+
+def test_the_object_index_of_shards_is_no_foreground(tmp_path: Path) -> None:
+    w = published.webdataset(tmp_path)
+    frame = open_source(tmp_path).frames("train")[0]
+    np.testing.assert_array_equal(frame.object_index_left, w.disparity_left > 10)
+    assert frame.foreground_left is None
 
 
 def test_splits(tmp_path: Path) -> None:
