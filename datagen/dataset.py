@@ -66,6 +66,11 @@ class StereoSample:
         split, group, scene, _, _ = left.parts[-5:]
         return "/".join((split, group, scene, left.stem))
 
+    @property
+    def scene_name(self) -> str:
+        """Split and scene, for example `TEST/A/0003`."""
+        return self.name.rpartition("/")[0]
+
     @cached_property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels, from the header of the left image."""

@@ -28,6 +28,11 @@ class StereoFrame(Protocol):
         """Unique within its source."""
 
     @property
+    def scene_name(self) -> str:
+        """Which of its source's scenes it is of: frames of one scene show the same things at other moments, from other
+        places, in other light, so they are no independent draws."""
+
+    @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
 
@@ -78,6 +83,7 @@ class FileFrame:
     """
 
     name: str
+    scene_name: str
     read_left: Callable[[], Picture]
     read_right: Callable[[], Picture]
     read_disparity_left: Callable[[], DisparityMap]

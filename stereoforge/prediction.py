@@ -83,7 +83,7 @@ class Predictors:
     def frame(self, sample: StereoFrame) -> EvaluationFrame:
         """One sample with all that is predicted for it, and how long that took.
 
-        Where nobody knows what is occluded, nothing is taken to be. Frames of one folder are of one scene.
+        Where nobody knows what is occluded, nothing is taken to be.
         """
         occlusion = sample.occlusion_left
         left, right = sample.left, sample.right  # Read here: decoding and hashing are not the networks' time.
@@ -106,7 +106,7 @@ class Predictors:
             right=right,
             fine_tuned=fine_tuned,
             objects=sample.foreground_left,
-            scene=sample.name.rpartition("/")[0],
+            scene=sample.scene_name,
             other_confidences={}
             if self.forest is None
             else {"rdf": self._forest_confidence(sample, prediction)},

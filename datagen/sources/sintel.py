@@ -64,6 +64,7 @@ def _frames(folder: Path, render_pass: str) -> Iterator[FileFrame]:
         path = truth.relative_to(folder / "disparities")
         yield FileFrame(
             name=path.with_suffix("").as_posix(),
+            scene_name=path.parent.as_posix(),
             read_left=partial(read_picture, folder / f"{render_pass}_left" / path),
             read_right=partial(read_picture, folder / f"{render_pass}_right" / path),
             read_disparity_left=partial(read_disparity, truth),

@@ -35,6 +35,7 @@ INDEX_NAME = "index.json"
 META = "meta.json"
 """The member that describes its sample, with the SHA-256 of the other ones."""
 _DESCRIPTIONS_KEPT = 256
+_KEY = re.compile(rf"((?:{'|'.join(SPLITS)})-\d{{4,}})-\d{{4,}}")
 _SHARD_NAME = re.compile(rf"({'|'.join(SPLITS)})-\d{{6,}}\.tar")
 
 
@@ -124,10 +125,17 @@ def read_index(location: str) -> ShardSetIndex | None:
     return index
 
 
+def scene_of(key: str) -> str:
+    """The scene of a sample by its key: `<split>-<scene>` of ours, the folder of keys with one, else its own."""
+    match = _KEY.fullmatch(key)
+    return match[1] if match else key.rpartition("/")[0] or key
+
+
 def _frame(shard: str, key: str) -> FileFrame:
     read = partial(_read, shard, key)
     return FileFrame(
         name=key,
+        scene_name=scene_of(key),
         read_left=partial(read, "left.png", decode_png),
         read_right=partial(read, "right.png", decode_png),
         read_disparity_left=partial(read, "disparity_left.pfm", decode_pfm),

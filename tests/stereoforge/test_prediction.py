@@ -66,7 +66,7 @@ def slow_frame(clock: Clock, name: str) -> FileFrame:
     """A frame whose every array takes its time to be read."""
     image, truth = np.zeros((*SIZE, 3), np.uint8), np.full(SIZE, 6, np.float32)
     reads = [clock.after(DECODING_S, array) for array in (image, image, truth)]
-    return FileFrame(name, *reads)
+    return FileFrame(name, name, *reads)
 
 
 def predictors(clock: Clock, compiled: bool) -> Predictors:
@@ -89,6 +89,21 @@ def test_compiling_at_the_first_frame_is_not_the_networks_time(clock: Clock) -> 
     assert scores["regressor"].seconds == pytest.approx(PREDICTING_S, abs=1.0)
     assert scores["regressor_f"].seconds == pytest.approx(PREDICTING_S, abs=1.0)
     assert len(scores) == 2
+
+
+def test_exports_have_the_scenes_of_the_set_they_were_made_from(tmp_path: Path, clock: Clock) -> None:
+    """As many as intervals are drawn from: two frames of each of five scenes, however they are stored."""
+    write_dataset(tmp_path / "set", {"train": 5})
+    sets = [StereoDataset(tmp_path / "set", "train")]
+    scenes = [f"TRAIN/A/{number // 2:04d}" for number in range(10)]
+    assert [frame.scene_name for frame in sets[0]] == scenes
+    for name in ("webdataset", "kitti", "sceneflow"):
+        EXPORTERS[name](sets, open_tree(tmp_path / name), ExportOptions(), lambda *_: None)
+        (data,) = open_test_data([str(tmp_path / name)], "train")
+        frames = [predictors(clock, compiled=True).frame(frame) for frame in data.frames]
+        assert len(frames) == 10
+        pairs = [(frame.scene, scene) for frame, scene in zip(frames, scenes, strict=True)]
+        assert len(set(pairs)) == len({scene for scene, _ in pairs}) == 5
 
 
 def test_sets_that_number_every_object_have_no_foreground_for_kitti_s_table(

@@ -12,6 +12,7 @@ from datagen import DatasetError
 from datagen.derived import derive_occlusion
 from datagen.shards import CACHE_VARIABLE
 from datagen.source import DataSource, open_source, source_formats
+from datagen.sources.webdataset import scene_of
 from tests.datagen.sources import published
 from tests.datagen.sources.published import World, png, shard, shard_members, world
 
@@ -91,6 +92,77 @@ def test_final_passes(tmp_path: Path) -> None:
     w = published.flyingthings3d(tmp_path)
     frame = open_source(f"flyingthings3d-final:{tmp_path}").frames("train")[0]
     np.testing.assert_array_equal(frame.right, w.left)
+
+
+SCENES = {
+    "flyingthings3d": "TRAIN/B/0017",
+    "driving": "driving",
+    "monkaa": "eating",
+    "sintel": "alley_1",
+    "kitti2012": "000003_10",
+    "kitti2015": "000003_10",
+    "middlebury": "Adirondack",
+    "eth3d": "delivery_area",
+    "middlebury2003": "cones",
+    "crestereo": "tree/0a1b",
+    "webdataset": "train-0000",
+}
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_a_frame_says_which_scene_it_is_of(name: str, tmp_path: Path) -> None:
+    SETS[name](tmp_path)
+    assert open_source(tmp_path).frames("train")[0].scene_name == SCENES[name]
+
+
+@pytest.mark.parametrize(
+    ("folders", "scenes"),
+    [
+        (
+            ["Piano", "PianoL", "Classroom2", "Classroom2E", "Teddy"],
+            ["Piano"] * 2 + ["Classroom"] * 2 + ["Teddy"],
+        ),
+        (["Sword1-perfect", "Sword1-imperfect", "Mask-perfect"], ["Sword", "Sword", "Mask"]),
+        (["chess1", "chess2", "artroom1"], ["chess", "chess", "artroom"]),
+        (["trainingQ/ArtL", "trainingF/ArtL"], ["Art", "Art"]),
+        (["0001", "0002", "room_12", "room_13"], ["0001", "0002", "room_12", "room_13"]),
+    ],
+)
+def test_pictures_of_one_middlebury_scene(folders: list[str], scenes: list[str], tmp_path: Path) -> None:
+    published.middlebury(tmp_path / "set")
+    for folder in folders:
+        shutil.copytree(tmp_path / "set/trainingQ/Adirondack", tmp_path / "other" / folder)
+    found = {frame.name: frame.scene_name for frame in open_source(tmp_path / "other").frames("test")}
+    assert found == dict(zip(folders, scenes, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("key", "scene"),
+    [
+        ("train-0003-0006", "train-0003"),
+        ("test-12345-0007", "test-12345"),
+        ("000042", "000042"),
+        ("kitchen-3", "kitchen-3"),
+        ("kitchen/0003", "kitchen"),
+    ],
+)
+def test_scenes_of_shards_keys(key: str, scene: str) -> None:
+    assert scene_of(key) == scene
+
+
+def test_monkaas_folders_show_eight_worlds(tmp_path: Path) -> None:
+    published.monkaa(tmp_path)
+    more = (
+        "eating_naked_camera2_x2",
+        "lonetree_difftex2_x2",
+        "lonetree_winter_x2",
+        "funnyworld_camera2_augmented1_x2",
+    )
+    for folder in ("disparity", "frames_cleanpass"):
+        for name in more:
+            shutil.copytree(tmp_path / folder / "eating_x2", tmp_path / folder / name)
+    found = [frame.scene_name for frame in open_source(tmp_path).frames("test")]
+    assert found == ["eating", "eating", "funnyworld", "lonetree", "lonetree"]
 
 
 @pytest.mark.parametrize("name", ["flyingthings3d", "driving", "monkaa", "sintel"])
