@@ -144,7 +144,8 @@ class FrameCheck:
         sample, stored = self.samples[0], "optical_flow" in self.recipe.targets
         index = sample.view(eye).object_index
         for direction in DIRECTIONS:
-            marked, messages = sample.motion_boundaries(eye, direction), iter(())
+            marked = sample.motion_boundaries(eye, direction)
+            messages: Iterator[str] = iter(())
             if stored:
                 expected = motion_boundaries(sample.flow(eye, direction), index)
                 messages = check_derived(marked, expected, "optical flow and object index")
