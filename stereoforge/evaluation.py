@@ -10,6 +10,7 @@ from datagen import StereoSample
 from datagen.frame import StereoFrame
 from datagen.manifest import read_manifest
 from datagen.source import open_source
+from datagen.sources.webdataset import ShardFrames
 from refine.evaluation import EvaluationFrame, EvaluationOptions, evaluate
 from refine.methods import Method
 from refine.report import ReportContext, ReportFiles, write_report
@@ -56,7 +57,10 @@ def open_test_data(sources: Sequence[str], split: str) -> list[TestData]:
 
 
 def family_of(source: str, frames: Sequence[StereoFrame]) -> str:
-    """The family that rendered a set of ours, by its first scene's manifest; else the format's name."""
+    """The family that rendered a set of ours, as the first scene's manifest or the first sample of shards says; else
+    the format's name. Raises DatasetError."""
+    if isinstance(frames, ShardFrames) and frames.family is not None:
+        return frames.family
     first = frames[0]
     if isinstance(first, StereoSample):
         return read_manifest(first.layout.manifest(first.split, first.scene)).family
