@@ -70,4 +70,10 @@ def _frame(left: Path, right: Path) -> StereoFrame:
     def unknown() -> NDArray[np.float32]:
         return np.full(read_picture(left).shape[:2], np.nan, np.float32)
 
-    return FileFrame(left.stem, partial(read_picture, left), partial(read_picture, right), unknown)
+    return FileFrame(
+        name=left.stem,
+        scene_name=left.stem,
+        read_left=partial(read_picture, left),
+        read_right=partial(read_picture, right),
+        read_disparity_left=unknown,
+    )
