@@ -19,7 +19,7 @@ from refine.energy.parameters import MRFParameters
 from refine.mrf.solve import checked_problem
 from refine.solvers.linear import SolverError
 from refine.solvers.multigrid import GivenSystem
-from refine.solvers.stencils import Couplings, couplings_of, crop, data_weight
+from refine.solvers.stencil.operator import Couplings, couplings_of, crop, data_weight
 from stereoforge_kit.errors import InputError
 
 TOLERANCE = 1e-3

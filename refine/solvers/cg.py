@@ -6,7 +6,7 @@ import numpy as np
 
 from refine.solvers.krylov import solve_iteratively
 from refine.solvers.linear import LinearSolution, Problem
-from refine.solvers.stencils import Singles, data_weight, system_of
+from refine.solvers.stencil.operator import Singles, data_weight, system_of
 
 MAX_ITERATIONS = 5000
 

@@ -11,7 +11,7 @@ from numba import njit, prange
 
 from refine.energy.affinity import Floats
 from refine.solvers.linear import LinearSolution, Problem
-from refine.solvers.stencils import Singles, StencilOperator, System, crop
+from refine.solvers.stencil.operator import Singles, StencilOperator, System, crop
 
 Preconditioner = Callable[[Singles, Singles], None]
 """Of a residual, a correction into the second array; both padded."""

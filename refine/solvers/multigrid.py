@@ -17,11 +17,11 @@ import numpy as np
 from numba import njit, prange
 
 from refine.energy.affinity import Floats
-from refine.solvers.chessboard import Coarsening, coarsen
-from refine.solvers.halves import halves, widened
+from refine.solvers.amg.red_black import Coarsening, coarsen
+from refine.solvers.bfloat16 import halves, widened
 from refine.solvers.krylov import Iterated, krylov, solve_iteratively
 from refine.solvers.linear import LinearSolution, Problem
-from refine.solvers.stencils import (
+from refine.solvers.stencil.operator import (
     Couplings,
     Singles,
     StencilOperator,

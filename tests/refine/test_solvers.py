@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 
 from refine import MRFParameters
-from refine.solvers.rows import Rows
+from refine.solvers.amg.csr import Rows
 from tests.refine.worlds import random_problem
 
 DEFAULTS = MRFParameters()
@@ -17,9 +17,9 @@ DEFAULTS = MRFParameters()
 
 @pytest.mark.parametrize(("height", "width"), [(1, 1), (1, 6), (7, 1), (6, 8), (7, 9), (8, 7)])
 def test_eliminating_black_pixels_is_the_schur_complement(height, width):
-    from refine.solvers.chessboard import eliminate_black
+    from refine.solvers.amg.red_black import eliminate_black
     from refine.solvers.linear import Problem as Checked
-    from refine.solvers.stencils import couplings_of, data_weight
+    from refine.solvers.stencil.operator import couplings_of, data_weight
 
     problem = random_problem(height, width, seed=23)
     checked = Checked(*problem.inputs, DEFAULTS, "exact", problem.disparity)
@@ -47,11 +47,11 @@ def test_eliminating_black_pixels_is_the_schur_complement(height, width):
 
 @pytest.mark.parametrize("style", ["smooth", "noise", "mixed"])
 def test_the_first_level_is_smoothed_alike_as_an_image_and_by_windows(style):
-    from refine.solvers.chessboard import eliminate_black, grid_hierarchy
-    from refine.solvers.hierarchy import build_hierarchy
+    from refine.solvers.amg.hierarchy import build_hierarchy
+    from refine.solvers.amg.red_black import eliminate_black, grid_hierarchy
+    from refine.solvers.amg.sell import by_windows
     from refine.solvers.linear import Problem as Checked
-    from refine.solvers.stencils import couplings_of, data_weight
-    from refine.solvers.windows import by_windows
+    from refine.solvers.stencil.operator import couplings_of, data_weight
 
     problem = random_problem(45, 62, seed=5, style=style)
     checked = Checked(*problem.inputs, DEFAULTS, "exact", problem.disparity)
@@ -75,7 +75,7 @@ def test_the_first_level_is_smoothed_alike_as_an_image_and_by_windows(style):
 def test_the_stencils_are_the_sparse_matrix(form, style, sigma_r):
     """Taller than the bands of rows they are made by; a third of the gradients unknown."""
     from refine.solvers.linear import Problem as Checked
-    from refine.solvers.stencils import crop, data_weight, pad, system_of
+    from refine.solvers.stencil.operator import crop, data_weight, pad, system_of
 
     problem = random_problem(133, 19, seed=31, style=style)
     gradient = np.where(np.random.default_rng(2).random((133, 19, 2)) < 0.3, np.nan, problem.gradient)
@@ -110,7 +110,7 @@ def random_graph(size, reach, seed):
 
 @pytest.mark.parametrize(("size", "reach"), [(1, 1), (511, 40), (1300, 1300), (90_000, 70_000)])
 def test_smoothing_by_windows_is_damped_jacobi_on_the_couplings(size, reach):
-    from refine.solvers.windows import by_windows
+    from refine.solvers.amg.sell import by_windows
 
     rows, excess = random_graph(size, reach, seed=3)
     smoother, position = by_windows(rows, excess)
@@ -133,7 +133,7 @@ def test_smoothing_by_windows_is_damped_jacobi_on_the_couplings(size, reach):
 
 def test_what_is_smoothed_with_by_windows_keeps_the_excess():
     """Rounded couplings would otherwise weigh more than a small excess: M' 1 = excess all the same."""
-    from refine.solvers.windows import by_windows
+    from refine.solvers.amg.sell import by_windows
 
     rows, excess = random_graph(1300, 100, seed=4)
     smoother, position = by_windows(rows, 1e-4 * excess)
@@ -145,7 +145,7 @@ def test_what_is_smoothed_with_by_windows_keeps_the_excess():
 
 @pytest.mark.parametrize(("size", "reach"), [(5000, 50), (20_000, 300), (20_000, 20_000)])
 def test_restriction_is_the_transpose_of_interpolation(size, reach):
-    from refine.solvers.transfer import transfer_of
+    from refine.solvers.amg.interpolation import transfer_of
 
     rng = np.random.default_rng(5)
     length = rng.integers(0, 4, size)
@@ -172,8 +172,8 @@ def test_restriction_is_the_transpose_of_interpolation(size, reach):
 
 @pytest.mark.parametrize("size", [2, 40, 900])
 def test_the_next_level_is_the_galerkin_product(size):
-    from refine.solvers.galerkin import galerkin_pieces, interpolation, joined
-    from refine.solvers.splitting import COARSE, LOOSE, lead_with_strong, split
+    from refine.solvers.amg.cf_splitting import COARSE, LOOSE, lead_with_strong, split
+    from refine.solvers.amg.galerkin import galerkin_pieces, interpolation, joined
 
     rows, excess = random_graph(size, 30, seed=6)
     couplings = sp.csr_array((rows.value, rows.column, rows.start), shape=(size, size)).toarray()

@@ -30,8 +30,8 @@ from refine.energy.system import Form
 from refine.mrf.torch.aggregation import AggregationCycle
 from refine.solvers import SolverError
 from refine.solvers.multigrid import GivenSystem
-from refine.solvers.stencils import Couplings, crop
-from refine.solvers.stencils import pad as padded
+from refine.solvers.stencil.operator import Couplings, crop
+from refine.solvers.stencil.operator import pad as padded
 from stereoforge_kit.errors import InputError
 
 Map = Callable[[Tensor], Tensor]

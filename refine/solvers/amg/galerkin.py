@@ -8,15 +8,15 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.solvers.rows import Indices, Rows, of
-from refine.solvers.splitting import COARSE, FINE
-from refine.solvers.stencils import Singles
+from refine.solvers.amg.cf_splitting import COARSE, FINE
+from refine.solvers.amg.csr import Indices, Rows, of
+from refine.solvers.stencil.operator import Singles
 
 
 def interpolation(
     graph: Rows, diagonal: Singles, excess: Singles, ends: Indices, state: NDArray[np.int8]
 ) -> tuple[Rows, int]:
-    """P for this splitting (`refine.solvers.splitting`), and the number of coarse unknowns."""
+    """P for this splitting (`refine.solvers.amg.cf_splitting`), and the number of coarse unknowns."""
     number = np.cumsum(state == COARSE, dtype=np.int32) - np.int32(1)
     coarse = int(number[-1]) + 1
     start = np.zeros(state.size + 1, np.int32)

@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.solvers.rows import Indices, Rows
-from refine.solvers.stencils import Singles
-from refine.solvers.windows import WINDOW
+from refine.solvers.amg.csr import Indices, Rows
+from refine.solvers.amg.sell import WINDOW
+from refine.solvers.stencil.operator import Singles
 
 _CHUNKS = 8
 
@@ -41,7 +41,7 @@ class Transfer:
 
 def transfer_of(prolong: Rows, fine_position: Indices, coarse_position: Indices) -> Transfer:
     """Of an interpolation by rows; the positions say where an unknown is in its level's vectors, and those of one
-    window (`refine.solvers.windows`) stay together."""
+    window (`refine.solvers.amg.sell`) stay together."""
     coarse = coarse_position[prolong.column]
     fine = np.repeat(fine_position, np.diff(prolong.start))
     windows = -(-fine_position.size // WINDOW)

@@ -18,9 +18,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.solvers.halves import Halves, narrowed, widened
-from refine.solvers.rows import Indices, Rows
-from refine.solvers.stencils import Singles
+from refine.solvers.amg.csr import Indices, Rows
+from refine.solvers.bfloat16 import Halves, narrowed, widened
+from refine.solvers.stencil.operator import Singles
 
 WINDOW = 512
 """Unknowns that are numbered anew among themselves."""
@@ -32,7 +32,7 @@ _BACK = 1 << 15
 
 @dataclass(frozen=True)
 class WindowSmoother:
-    """`refine.solvers.hierarchy.Smoother` on couplings by windows; vectors in the windows' numbering."""
+    """`refine.solvers.amg.hierarchy.Smoother` on couplings by windows; vectors in the windows' numbering."""
 
     first: Indices
     """Of each window, its first diagonal."""

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from refine.energy.affinity import NEIGHBORS, Floats
 from refine.energy.system import Form
-from refine.solvers.halves import Halves, widened
+from refine.solvers.bfloat16 import Halves, widened
 from refine.solvers.linear import Problem, SolverError
 
 MARGIN = 2

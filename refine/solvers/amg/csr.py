@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from refine.solvers.stencils import Singles
+from refine.solvers.stencil.operator import Singles
 
 Indices = NDArray[np.int32]
 

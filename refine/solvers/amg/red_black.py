@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit, prange
 
-from refine.solvers.halves import Halves, halves, widened
-from refine.solvers.hierarchy import Hierarchy, build_hierarchy
-from refine.solvers.rows import Indices, Rows
-from refine.solvers.stencils import MARGIN, CouplingRows, Singles, bands
-from refine.solvers.windows import DAMPING
+from refine.solvers.amg.csr import Indices, Rows
+from refine.solvers.amg.hierarchy import Hierarchy, build_hierarchy
+from refine.solvers.amg.sell import DAMPING
+from refine.solvers.bfloat16 import Halves, halves, widened
+from refine.solvers.stencil.operator import MARGIN, CouplingRows, Singles, bands
 
 STRONGER = np.float32(3)
 """Times as strong as what it stands for, the coupling of a detour has to be."""
@@ -40,7 +40,7 @@ class Elimination:
     """(H, W) the M-matrix's excess."""
     ties: Halves
     """(4, H, W) its couplings to the right, downwards, down right, and of the pixel to the right to the one below,
-    in bfloat16 (`refine.solvers.halves`): all below is made of the rounded ones."""
+    in bfloat16 (`refine.solvers.bfloat16`): all below is made of the rounded ones."""
     relax: Singles
     """(H, W) 1 / diagonal at eliminated pixels. At the others minus `DAMPING` / diagonal of what is left, once that
     is known, and 0 before."""
@@ -55,7 +55,7 @@ class Elimination:
         _prolong(self.ties, self.relax, left, residual, x)
 
     def graph(self) -> tuple[Rows, Singles, Indices]:
-        """Couplings and excess (`refine.solvers.hierarchy`) of the pixels that are left, and which they are."""
+        """Couplings and excess (`refine.solvers.amg.hierarchy`) of the pixels that are left, and which they are."""
         number = np.full(self.tau.shape, -1, np.int32)
         inside = number[2:-2, 2:-2]
         left = self.relax[2:-2, 2:-2] <= 0
@@ -74,7 +74,7 @@ class Elimination:
 
 @dataclass(frozen=True)
 class GridSmoother:
-    """`refine.solvers.hierarchy.Smoother` for the pixels that are left, without indices.
+    """`refine.solvers.amg.hierarchy.Smoother` for the pixels that are left, without indices.
 
     Vectors are padded images, flat. At eliminated pixels they hold the solution for a residual of 0 there, so that
     what is left of the M-matrix is applied as the M-matrix itself.

@@ -20,12 +20,12 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.solvers.galerkin import galerkin_pieces, interpolation, joined
-from refine.solvers.rows import Indices, Rows, of
-from refine.solvers.splitting import lead_with_strong, split
-from refine.solvers.stencils import Singles
-from refine.solvers.transfer import Transfer, transfer_of
-from refine.solvers.windows import by_windows
+from refine.solvers.amg.cf_splitting import lead_with_strong, split
+from refine.solvers.amg.csr import Indices, Rows, of
+from refine.solvers.amg.galerkin import galerkin_pieces, interpolation, joined
+from refine.solvers.amg.interpolation import Transfer, transfer_of
+from refine.solvers.amg.sell import by_windows
+from refine.solvers.stencil.operator import Singles
 
 STRENGTH = 0.5
 """A coupling is strong for i if it is at least this share of i's largest. At 0.25 the coarse levels hold
