@@ -1,6 +1,6 @@
-"""Numbers in half precision, for a preconditioner's coefficients: the upper half of a float32 (bfloat16).
+"""bfloat16, the upper half of a float32, for the coefficients of a preconditioner.
 
-numba has no such type, so they are kept as the integers of their bits.
+numba has no such type, so the numbers are kept as the integers of their bits.
 """
 
 from __future__ import annotations
@@ -9,29 +9,32 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-Halves = NDArray[np.uint16]
+from refine.solvers.arrays import Float32Array
+
+BFloat16Array = NDArray[np.uint16]
+"""The bits of bfloat16 numbers."""
 
 
 @njit(cache=True)
-def narrowed(single):
-    """bfloat16 of float32, rounded."""
-    return (np.float32(single).view(np.uint32) + np.uint32(0x8000)) >> np.uint32(16)
+def to_bfloat16(value):
+    """Round a float32 to the nearest bfloat16, ties away from zero; kernel."""
+    return (np.float32(value).view(np.uint32) + np.uint32(0x8000)) >> np.uint32(16)
 
 
 @njit(cache=True)
-def widened(half):
-    """float32 of bfloat16."""
-    return np.uint32(np.uint32(half) << np.uint32(16)).view(np.float32)
+def to_float32(bits):
+    """The float32 of a bfloat16, exactly; kernel."""
+    return np.uint32(np.uint32(bits) << np.uint32(16)).view(np.float32)
 
 
-def halves(values: NDArray[np.float32]) -> Halves:
-    """An array rounded."""
+def round_to_bfloat16(values: Float32Array) -> BFloat16Array:
+    """Round an array of any shape to bfloat16."""
     rounded = np.empty(values.shape, np.uint16)
-    _narrow(values.reshape(-1), rounded.reshape(-1))
+    _round(values.reshape(-1), rounded.reshape(-1))
     return rounded
 
 
 @njit(cache=True, parallel=True)
-def _narrow(values, rounded):
+def _round(values, rounded):
     for i in prange(values.size):
-        rounded[i] = narrowed(values[i])
+        rounded[i] = to_bfloat16(values[i])

@@ -1,26 +1,23 @@
-"""Sparse matrices by rows, as plain arrays for numba."""
+"""Compressed sparse rows (CSR) as plain arrays for numba."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from refine.solvers.stencil.operator import Singles
-
-Indices = NDArray[np.int32]
+from refine.solvers.arrays import Float32Array, IndexArray
 
 
 @dataclass(frozen=True)
-class Rows:
-    """A sparse matrix by rows."""
+class CSRMatrix:
+    """A sparse matrix in CSR format, named as in scipy: row i has the entries indptr[i] to indptr[i + 1]."""
 
-    start: Indices
-    column: Indices
-    value: Singles
+    indptr: IndexArray
+    """(rows + 1)."""
+    indices: IndexArray
+    """(entries) column of each entry, in any order within a row."""
+    data: Float32Array
+    """(entries)."""
 
-
-def of(rows: Rows) -> tuple[Indices, Indices, Singles]:
-    """The arrays, for a kernel."""
-    return rows.start, rows.column, rows.value
+    def arrays(self) -> tuple[IndexArray, IndexArray, Float32Array]:
+        """(indptr, indices, data), the arguments of a kernel."""
+        return self.indptr, self.indices, self.data

@@ -1,4 +1,4 @@
-"""The next level of a hierarchy: interpolation from the coarse unknowns, and P' M P."""
+"""The coarse level's matrix: the Galerkin product P' M P, in CSR."""
 
 from __future__ import annotations
 
@@ -8,189 +8,156 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.solvers.amg.cf_splitting import COARSE, FINE
-from refine.solvers.amg.csr import Indices, Rows, of
-from refine.solvers.stencil.operator import Singles
-
-
-def interpolation(
-    graph: Rows, diagonal: Singles, excess: Singles, ends: Indices, state: NDArray[np.int8]
-) -> tuple[Rows, int]:
-    """P for this splitting (`refine.solvers.amg.cf_splitting`), and the number of coarse unknowns."""
-    number = np.cumsum(state == COARSE, dtype=np.int32) - np.int32(1)
-    coarse = int(number[-1]) + 1
-    start = np.zeros(state.size + 1, np.int32)
-    _count_interpolation(graph.column, ends, state, start)
-    np.cumsum(start, out=start)
-    column, value = np.empty(start[-1], np.int32), np.empty(start[-1], np.float32)
-    _fill_interpolation(
-        graph.column, graph.value, diagonal, excess, ends, state, number, start, column, value
-    )
-    return Rows(start, column, value), coarse
+from refine.solvers.amg.csr import CSRMatrix
+from refine.solvers.arrays import Float32Array, IndexArray
 
 
 @dataclass(frozen=True)
-class Pieces:
-    """Couplings by rows in parts, so that those of the level above need not be there when they are put together."""
+class RowBlocks:
+    """A matrix in CSR in blocks of rows, so that the level above need not be alive when they are concatenated."""
 
-    start: Indices
-    columns: list[Indices]
-    values: list[Singles]
+    indptr: IndexArray
+    indices: list[IndexArray]
+    data: list[Float32Array]
+
+    def concatenated(self) -> CSRMatrix:
+        """The whole matrix; the blocks are emptied."""
+        indices = np.concatenate(self.indices)
+        self.indices.clear()
+        data = np.concatenate(self.data)
+        self.data.clear()
+        return CSRMatrix(self.indptr, indices, data)
 
 
-def galerkin_pieces(
-    graph: Rows,
-    diagonal: Singles,
-    excess: Singles,
-    prolong: Rows,
-    coarse: int,
+def galerkin_product(
+    couplings: CSRMatrix,
+    diagonal: Float32Array,
+    row_sum: Float32Array,
+    interpolation: CSRMatrix,
+    coarse_size: int,
     bounds: NDArray[np.int64],
-) -> tuple[Pieces, Singles]:
-    """P' M P as couplings and excess. The bounds say which of its rows are made side by side."""
-    restrict = _transposed(prolong, coarse)
-    start, next_excess = np.zeros(coarse + 1, np.int32), np.empty(coarse, np.float32)
+) -> tuple[RowBlocks, Float32Array]:
+    """Compute P' M P for an M-matrix M.
+
+    Args:
+        couplings: Of M.
+        diagonal: (n) of M.
+        row_sum: (n) of M.
+        interpolation: P.
+        coarse_size: Number of P's columns.
+        bounds: Where the blocks of rows begin and end that are computed in parallel.
+
+    Returns:
+        The couplings of the product, and (coarse_size) its row sums.
+    """
+    restriction = _transposed(interpolation, coarse_size)
+    indptr, coarse_row_sum = np.zeros(coarse_size + 1, np.int32), np.empty(coarse_size, np.float32)
     parent, share = np.empty(diagonal.size, np.uint32), np.empty(diagonal.size, np.float32)
-    sums = np.empty(diagonal.size, np.float32)
-    most = _first_entries(*of(prolong), np.uint32(coarse), parent, share, sums)
-    pieces = _multiply(
-        *_unsigned(graph), diagonal, excess, sums, parent, share, *_unsigned(prolong), most,
-        *_unsigned(restrict), bounds, start, next_excess,
+    p_row_sum = np.empty(diagonal.size, np.float32)
+    longest = _first_entries(*interpolation.arrays(), np.uint32(coarse_size), parent, share, p_row_sum)
+    blocks = _multiply(
+        *_unsigned(couplings), diagonal, row_sum, p_row_sum, parent, share, *_unsigned(interpolation), longest,
+        *_unsigned(restriction), bounds, indptr, coarse_row_sum,
     )  # fmt: skip
-    np.cumsum(start, out=start)
-    columns, values = zip(*pieces, strict=True)
-    return Pieces(start, list(columns), list(values)), next_excess
+    np.cumsum(indptr, out=indptr)
+    indices, data = zip(*blocks, strict=True)
+    return RowBlocks(indptr, list(indices), list(data)), coarse_row_sum
 
 
-def joined(pieces: Pieces) -> Rows:
-    """The couplings; the pieces are emptied."""
-    column = np.concatenate(pieces.columns)
-    pieces.columns.clear()
-    value = np.concatenate(pieces.values)
-    pieces.values.clear()
-    return Rows(pieces.start, column, value)
-
-
-def _transposed(rows: Rows, columns: int) -> Rows:
-    start = np.zeros(columns + 1, np.int32)
-    column, value = np.empty_like(rows.column), np.empty_like(rows.value)
-    _transpose(*of(rows), start, column, value)
-    return Rows(start, column, value)
-
-
-@njit(cache=True, parallel=True)
-def _count_interpolation(column, ends, state, count):
-    for i in prange(state.size):
-        if state[i] == COARSE:
-            count[i + 1] = 1
-        elif state[i] == FINE:
-            for e in range(ends[0, i], ends[2, i]):
-                count[i + 1] += state[column[e]] == COARSE
-
-
-@njit(cache=True, parallel=True)
-def _fill_interpolation(column, value, diagonal, excess, ends, state, number, place, into, weight):
-    """Direct interpolation: the strong coarse neighbours stand for all neighbours."""
-    for i in prange(state.size):
-        at = place[i]
-        if state[i] == COARSE:
-            into[at] = number[i]
-            weight[at] = 1
-        elif state[i] == FINE:
-            kept = np.float32(0)
-            for e in range(ends[0, i], ends[2, i]):
-                if state[column[e]] == COARSE:
-                    kept += value[e]
-                    into[at] = number[column[e]]
-                    weight[at] = value[e]
-                    at += 1
-            for e in range(place[i], at):
-                # Across a hard edge all couplings may be next to nothing, and kept * diagonal would underflow.
-                weight[e] = weight[e] / kept * ((diagonal[i] - excess[i]) / diagonal[i])
+def _transposed(matrix: CSRMatrix, columns: int) -> CSRMatrix:
+    indptr = np.zeros(columns + 1, np.int32)
+    indices, data = np.empty_like(matrix.indices), np.empty_like(matrix.data)
+    _transpose(*matrix.arrays(), indptr, indices, data)
+    return CSRMatrix(indptr, indices, data)
 
 
 @njit(cache=True)
-def _transpose(start, column, value, new_start, new_column, new_value):
-    for j in column:
-        new_start[j + 1] += 1
-    for j in range(new_start.size - 1):
-        new_start[j + 1] += new_start[j]
-    free = new_start[:-1].copy()
-    for i in range(start.size - 1):
-        for e in range(start[i], start[i + 1]):
-            at = free[column[e]]
-            free[column[e]] += 1
-            new_column[at] = i
-            new_value[at] = value[e]
+def _transpose(indptr, indices, data, new_indptr, new_indices, new_data):
+    for j in indices:
+        new_indptr[j + 1] += 1
+    for j in range(new_indptr.size - 1):
+        new_indptr[j + 1] += new_indptr[j]
+    free = new_indptr[:-1].copy()
+    for i in range(indptr.size - 1):
+        for e in range(indptr[i], indptr[i + 1]):
+            at = free[indices[e]]
+            free[indices[e]] += 1
+            new_indices[at] = i
+            new_data[at] = data[e]
 
 
-def _unsigned(rows: Rows) -> tuple[NDArray[np.uint32], NDArray[np.uint32], Singles]:
-    """For a kernel: an index that cannot be negative needs not be asked whether it counts from the end."""
-    return rows.start.view(np.uint32), rows.column.view(np.uint32), rows.value
+def _unsigned(matrix: CSRMatrix) -> tuple[NDArray[np.uint32], NDArray[np.uint32], Float32Array]:
+    """For a kernel: it need not test an index that cannot be negative for counting from the end."""
+    return matrix.indptr.view(np.uint32), matrix.indices.view(np.uint32), matrix.data
 
 
 @njit(cache=True, parallel=True)
-def _first_entries(start, column, value, none, parent, share, sums):
-    """Of each row the first entry, (none, 0) where there is none, and the sum; the most entries in one."""
-    most = 1
-    for i in prange(sums.size):
+def _first_entries(indptr, indices, data, none, parent, share, p_row_sum):
+    """The first entry of each row of P, (none, 0) where there is none, and the row's sum; the length of the longest
+    row."""
+    longest = 1
+    for i in prange(p_row_sum.size):
         parent[i], share[i] = none, 0
-        if start[i] < start[i + 1]:
-            parent[i], share[i] = column[start[i]], value[start[i]]
+        if indptr[i] < indptr[i + 1]:
+            parent[i], share[i] = indices[indptr[i]], data[indptr[i]]
         total = np.float32(0)
-        for e in range(start[i], start[i + 1]):
-            total += value[e]
-        sums[i] = total
-        most = max(most, start[i + 1] - start[i])
-    return most
+        for e in range(indptr[i], indptr[i + 1]):
+            total += data[e]
+        p_row_sum[i] = total
+        longest = max(longest, indptr[i + 1] - indptr[i])
+    return longest
 
 
 @njit(cache=True)
-def _add(j, amount, row, met, sums, columns, used):
-    """sums[j] += amount; j is put at the end of the columns if the row has not met it, without a branch."""
-    new = met[j] != row
-    met[j] = row
+def _accumulate(j, amount, row, marker, sums, columns, used):
+    """sums[j] += amount; j is appended to the columns if the row has not met it, without a branch."""
+    new = marker[j] != row
+    marker[j] = row
     columns[used] = j
     sums[j] = (0.0 if new else sums[j]) + amount
     return used + new
 
 
 @njit(cache=True)
-def _rows(
-    start, column, value, diagonal, excess, row_sums, parent, share, p_start, p_column, p_value, most,
-    r_start, r_column, r_value, first, last, count, next_excess,
+def _multiply_rows(
+    indptr, indices, data, diagonal, row_sum, p_row_sum, parent, share, p_indptr, p_indices, p_data, longest,
+    r_indptr, r_indices, r_data, first, last, count, coarse_row_sum,
 ):  # fmt: skip
-    """Rows first to last of P' M P without the diagonal, as couplings.
+    """Rows `first` up to `last` of P' M P without the diagonal, as couplings.
 
-    Most rows of P have one entry: the first is taken without asking whether it is there.
+    Row by row with a dense accumulator (F. G. Gustavson, "Two fast algorithms for sparse matrices: multiplication and
+    permuted transposition", ACM Trans. Math. Softw. 4 (3), 1978).
+    Most rows of P have one entry: the first is taken without testing whether it is there.
     """
     one = np.uint32(1)
     columns = np.empty(12 * (last - first) + 64, np.int32)
     values = np.empty(columns.size, np.float32)
-    met, sums = np.full(r_start.size, -1, np.int32), np.empty(r_start.size, np.float64)
+    marker, sums = np.full(r_indptr.size, -1, np.int32), np.empty(r_indptr.size, np.float64)
     used = 0
     for row in range(first, last):
         before, needed = used, used
-        for e in range(r_start[row], r_start[row + 1]):
-            needed += (start[r_column[e] + one] - start[r_column[e]] + 1) * most
+        for e in range(r_indptr[row], r_indptr[row + 1]):
+            needed += (indptr[r_indices[e] + one] - indptr[r_indices[e]] + 1) * longest
         if needed > columns.size:
             columns = np.concatenate((columns, np.empty(needed, np.int32)))
             values = np.concatenate((values, np.empty(needed, np.float32)))
-        met[row] = met[r_start.size - 1] = row
-        held = 0.0
-        for e in range(r_start[row], r_start[row + 1]):
-            i = r_column[e]
-            out = np.float64(excess[i] * row_sums[i])
-            for f in range(np.int64(start[i]) - 1, np.int64(start[i + one])):
-                own = f < start[i]
-                k = i if own else column[np.uint32(f)]
-                coupling = -diagonal[i] if own else value[np.uint32(f)]
-                out += coupling * (row_sums[i] - row_sums[k])  # P' M P 1, from differences
-                coupling *= r_value[e]
-                used = _add(parent[k], coupling * share[k], row, met, sums, columns, used)
-                for g in range(p_start[k] + one, p_start[k + one]):
-                    used = _add(p_column[g], coupling * p_value[g], row, met, sums, columns, used)
-            held += r_value[e] * out
-        next_excess[row] = held
+        # The diagonal, and what has no parent, count as met: they are not appended.
+        marker[row] = marker[r_indptr.size - 1] = row
+        total = 0.0
+        for e in range(r_indptr[row], r_indptr[row + 1]):
+            i = r_indices[e]
+            product = np.float64(row_sum[i] * p_row_sum[i])  # (M P 1)_i, from differences
+            for f in range(np.int64(indptr[i]) - 1, np.int64(indptr[i + one])):
+                own = f < indptr[i]
+                k = i if own else indices[np.uint32(f)]
+                coupling = -diagonal[i] if own else data[np.uint32(f)]
+                product += coupling * (p_row_sum[i] - p_row_sum[k])
+                coupling *= r_data[e]
+                used = _accumulate(parent[k], coupling * share[k], row, marker, sums, columns, used)
+                for g in range(p_indptr[k] + one, p_indptr[k + one]):
+                    used = _accumulate(p_indices[g], coupling * p_data[g], row, marker, sums, columns, used)
+            total += r_data[e] * product
+        coarse_row_sum[row] = total
         for at in range(before, used):
             values[at] = sums[columns[at]]
         count[row + 1] = used - before
@@ -199,14 +166,14 @@ def _rows(
 
 @njit(cache=True, parallel=True)
 def _multiply(
-    start, column, value, diagonal, excess, row_sums, parent, share, p_start, p_column, p_value, most,
-    r_start, r_column, r_value, bounds, count, next_excess,
+    indptr, indices, data, diagonal, row_sum, p_row_sum, parent, share, p_indptr, p_indices, p_data, longest,
+    r_indptr, r_indices, r_data, bounds, count, coarse_row_sum,
 ):  # fmt: skip
     empty = (np.empty(0, np.int32), np.empty(0, np.float32))
-    pieces = [empty for _ in range(bounds.size - 1)]
-    for part in prange(bounds.size - 1):
-        pieces[part] = _rows(
-            start, column, value, diagonal, excess, row_sums, parent, share, p_start, p_column, p_value, most,
-            r_start, r_column, r_value, bounds[part], bounds[part + 1], count, next_excess,
+    blocks = [empty for _ in range(bounds.size - 1)]
+    for block in prange(bounds.size - 1):
+        blocks[block] = _multiply_rows(
+            indptr, indices, data, diagonal, row_sum, p_row_sum, parent, share, p_indptr, p_indices, p_data,
+            longest, r_indptr, r_indices, r_data, bounds[block], bounds[block + 1], count, coarse_row_sum,
         )  # fmt: skip
-    return pieces
+    return blocks

@@ -1,13 +1,9 @@
-"""A multigrid hierarchy on the graph of couplings: classical coarsening (Ruge and Stueben) on compressed
-rows, as numba kernels.
+"""The multigrid hierarchy: Ruge and Stueben's classical coarsening of an M-matrix, and its V-cycle.
 
-What ties neighbouring pixels together jumps by five orders of magnitude from one pixel to the next, along
-every edge and every grain of texture. Coarse grids laid regularly over the image cannot follow that: five
-designs were tried (see docs/solver.md). So coarse unknowns are chosen by strength, and interpolation follows
-the strong couplings only.
-
-The graph is a symmetric M-matrix M, kept as couplings w_ij = -M_ij > 0 and an excess e = M 1, so that a small
-excess beside large couplings loses nothing to rounding.
+The couplings of neighbouring pixels jump by five orders of magnitude from one pixel to the next, along every edge and
+every grain of texture. Coarse grids laid regularly over the image cannot follow that; five such designs were tried (see
+docs/solver.md). So coarse unknowns are chosen by strength of connection, and interpolation follows the strong couplings
+only.
 """
 
 from __future__ import annotations
@@ -20,154 +16,175 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.solvers.amg.cf_splitting import lead_with_strong, split
-from refine.solvers.amg.csr import Indices, Rows, of
-from refine.solvers.amg.galerkin import galerkin_pieces, interpolation, joined
-from refine.solvers.amg.interpolation import Transfer, transfer_of
-from refine.solvers.amg.sell import by_windows
-from refine.solvers.stencil.operator import Singles
+from refine.solvers.amg.cf_splitting import cf_splitting, sort_by_strength
+from refine.solvers.amg.csr import CSRMatrix
+from refine.solvers.amg.galerkin import RowBlocks, galerkin_product
+from refine.solvers.amg.interpolation import Interpolation, arrange_interpolation, direct_interpolation
+from refine.solvers.amg.sell import sell_smoother
+from refine.solvers.arrays import Float32Array, IndexArray
 
-STRENGTH = 0.5
-"""A coupling is strong for i if it is at least this share of i's largest. At 0.25 the coarse levels hold
-twice the couplings, and the iterations are the same."""
-LOOSE = 0.2
-"""An unknown whose couplings sum to less than this share of its diagonal is left to the smoother."""
-COARSEST = 256
+STRENGTH_THRESHOLD = 0.5
+"""theta: i depends strongly on j if their coupling is at least this share of i's largest. At 0.25 the coarse levels
+hold twice the couplings, and the number of iterations is the same."""
+DOMINANCE = 0.2
+"""A row whose couplings sum to this share of its diagonal or less is left to the smoother."""
+MAX_COARSE = 256
 """Up to this many unknowns a level is solved densely."""
 _MAX_LEVELS = 30
 _STALLED = 0.9
 """Coarsening ends where a level keeps more than this share of the one above."""
 _CHUNKS = 8
-"""Parts of a level that are split independently; a constant, so that results do not depend on threads."""
+"""Parts of a level that are split independently; a constant, so that results do not depend on the number of
+threads."""
 _CHUNK_FROM = 4096
+"""Smaller levels are one chunk."""
 
 
 class Smoother(Protocol):
-    """One step of damped Jacobi on a level's M-matrix. Vectors are flat."""
+    """Damped Jacobi on a level's M-matrix M. Vectors are flat, (size)."""
 
     @property
     def size(self) -> int:
-        """Of the level's vectors."""
+        """Length of the level's vectors."""
 
-    def from_zero(self, b: Singles, x: Singles, left: Singles) -> None:
-        """A step from 0 into `x`, and b - M x into `left`."""
+    def pre_smooth(self, b: Float32Array, x: Float32Array, residual: Float32Array) -> None:
+        """One step from 0 for M x = b into `x`, and b - M x into `residual`."""
 
-    def again(self, b: Singles, x: Singles, out: Singles) -> None:
-        """A step from `x`, into `out`."""
+    def post_smooth(self, b: Float32Array, x: Float32Array, out: Float32Array) -> None:
+        """One step from `x` into `out`."""
 
 
-Arrangement = Callable[[Rows, Singles, Indices], Smoother]
-"""Couplings, excess, and where in its vectors each unknown is, to the smoother."""
+FirstLevel = Callable[[], tuple[CSRMatrix, Float32Array, IndexArray]]
+"""() -> couplings, row sums, and the place of each unknown in the level's vectors."""
+SmootherFactory = Callable[[CSRMatrix, Float32Array, IndexArray], Smoother]
+"""(couplings, row sums, places) -> smoother."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """One level: how it is smoothed, and how the next one is interpolated to it. The rest is for the cycle's use."""
+    """A level of the hierarchy, but for the coarsest; the vectors are the cycle's work space."""
 
     smoother: Smoother
-    transfer: Transfer
-    x: Singles
-    left: Singles
-    """Of the right-hand side; then the smoothed solution."""
-    below: Singles
+    interpolation: Interpolation
+    x: Float32Array
+    residual: Float32Array
+    """After post-smoothing the level's solution."""
+    coarse_b: Float32Array
     """The next level's right-hand side."""
 
 
 @dataclass(frozen=True)
 class Hierarchy:
-    """From the graph that was coarsened to the coarsest; at least one level and that."""
+    """All levels from fine to coarse; at least one and the coarsest."""
 
     levels: tuple[Level, ...]
-    coarsest: Singles
-    """Inverse of the coarsest matrix, dense; of its diagonal alone where coarsening ended early."""
+    coarsest_inverse: Float32Array
+    """(n, n) inverse of the coarsest matrix; (n) that of its diagonal where coarsening stalled."""
 
-    def correct(self, residual: Singles) -> Singles:
-        """An approximate solution on the first level, by one symmetric V-cycle; overwritten by the next call."""
-        side = residual
+    def v_cycle(self, b: Float32Array) -> Float32Array:
+        """An approximate solution of M x = b by one symmetric V(1, 1)-cycle; the next call overwrites it."""
+        right_hand_sides = [b]
         for level in self.levels:
-            level.smoother.from_zero(side, level.x, level.left)
-            level.transfer.restrict(level.left, level.below)
-            side = level.below
-        correction = self.coarsest * side if self.coarsest.ndim == 1 else _product(self.coarsest, side)
-        sides = (residual, *(level.below for level in self.levels[:-1]))
-        for level, side in zip(reversed(self.levels), reversed(sides), strict=True):
-            level.transfer.prolong(correction, level.x)
-            level.smoother.again(side, level.x, level.left)
-            correction = level.left
-        return correction
+            level.smoother.pre_smooth(right_hand_sides[-1], level.x, level.residual)
+            level.interpolation.restrict(level.residual, level.coarse_b)
+            right_hand_sides.append(level.coarse_b)
+        solution = self._solve_coarsest(right_hand_sides.pop())
+        for level, level_b in zip(reversed(self.levels), reversed(right_hand_sides), strict=True):
+            level.interpolation.prolong(solution, level.x)
+            level.smoother.post_smooth(level_b, level.x, level.residual)
+            solution = level.residual
+        return solution
+
+    def _solve_coarsest(self, b: Float32Array) -> Float32Array:
+        inverse = self.coarsest_inverse
+        return inverse * b if inverse.ndim == 1 else _product(inverse, b)
 
 
-def build_hierarchy(first: Callable[[], tuple[Rows, Singles, Indices]], arrange: Arrangement) -> Hierarchy:
-    """Coarsen an M-matrix.
+def build_hierarchy(first: FirstLevel, smoother_factory: SmootherFactory) -> Hierarchy:
+    """Set up the hierarchy for an M-matrix.
 
     Args:
-        first: Makes its couplings, its excess, and says where in the first level's vectors its unknowns are. A
-            function, so that none but the hierarchy holds the couplings, and only as long as it needs them.
-        arrange: Makes the smoother of the first level.
+        first: Makes the M-matrix. A function, so that only the hierarchy holds the couplings, and only as long as it
+            needs them.
+        smoother_factory: Makes the smoother of the first level.
     """
     levels: list[Level] = []
-    graph, excess, position = first()
-    smoother = arrange(graph, excess, position)
+    couplings, row_sum, position = first()
+    smoother = smoother_factory(couplings, row_sum, position)
     while True:
-        diagonal = _diagonal(graph.start, graph.value, excess)
-        ends, state = lead_with_strong(*of(graph), diagonal, STRENGTH, LOOSE)
-        split(graph.start, graph.column, ends, state, _bounds(state.size))
-        prolong, coarse = interpolation(graph, diagonal, excess, ends, state)
-        del ends, state
-        pieces, excess = galerkin_pieces(graph, diagonal, excess, prolong, coarse, _bounds(coarse))
-        del graph
-        graph = joined(pieces)
-        del pieces
-        kept = coarse / diagonal.size
-        last = coarse <= COARSEST or kept > _STALLED or len(levels) + 1 == _MAX_LEVELS
-        below, new_position = (None, np.arange(coarse, dtype=np.int32)) if last else by_windows(graph, excess)
-        transfer = transfer_of(prolong, position, new_position)
-        vectors = (np.zeros(size, np.float32) for size in (smoother.size, smoother.size, coarse))
-        levels.append(Level(smoother, transfer, *vectors))
-        if below is None:
-            break
-        smoother, position = below, new_position
-    dense = excess.size <= 4 * COARSEST
-    coarsest = (
-        _dense_inverse(graph, excess) if dense else _inverse(_diagonal(graph.start, graph.value, excess))
+        interpolation, blocks, coarse_row_sum = _coarsen(couplings, row_sum)
+        del couplings  # before the blocks are concatenated: the most memory is held here
+        couplings = blocks.concatenated()
+        fine_size, coarse_size = row_sum.size, coarse_row_sum.size
+        row_sum = coarse_row_sum
+        stalled = coarse_size / fine_size > _STALLED
+        coarsest = coarse_size <= MAX_COARSE or stalled or len(levels) + 1 == _MAX_LEVELS
+        coarse_position = np.arange(coarse_size, dtype=np.int32)
+        coarse_smoother: Smoother | None = None
+        if not coarsest:
+            coarse_smoother, coarse_position = sell_smoother(couplings, row_sum)
+        arranged = arrange_interpolation(interpolation, position, coarse_position)
+        del interpolation
+        vectors = (np.zeros(size, np.float32) for size in (smoother.size, smoother.size, coarse_size))
+        levels.append(Level(smoother, arranged, *vectors))
+        if coarse_smoother is None:
+            return Hierarchy(tuple(levels), _coarsest_inverse(couplings, row_sum))
+        smoother, position = coarse_smoother, coarse_position
+
+
+def _coarsen(couplings: CSRMatrix, row_sum: Float32Array) -> tuple[CSRMatrix, RowBlocks, Float32Array]:
+    """P, and the couplings and row sums of P' M P; sorts the couplings of M."""
+    diagonal = _diagonal(couplings.indptr, couplings.data, row_sum)
+    strong_ends, state = sort_by_strength(*couplings.arrays(), diagonal, STRENGTH_THRESHOLD, DOMINANCE)
+    cf_splitting(couplings.indptr, couplings.indices, strong_ends, state, _chunk_bounds(state.size))
+    interpolation, coarse_size = direct_interpolation(couplings, diagonal, row_sum, strong_ends, state)
+    del strong_ends, state
+    bounds = _chunk_bounds(coarse_size)
+    blocks, coarse_row_sum = galerkin_product(
+        couplings, diagonal, row_sum, interpolation, coarse_size, bounds
     )
-    return Hierarchy(tuple(levels), coarsest)
+    return interpolation, blocks, coarse_row_sum
 
 
-def _bounds(size: int) -> NDArray[np.int64]:
+def _chunk_bounds(size: int) -> NDArray[np.int64]:
     """Where the chunks of a level begin and end."""
     return np.linspace(0, size, (_CHUNKS if size >= _CHUNK_FROM else 1) + 1).astype(np.int64)
 
 
-def _inverse(diagonal: Singles) -> Singles:
+def _coarsest_inverse(couplings: CSRMatrix, row_sum: Float32Array) -> Float32Array:
+    """The dense inverse, or that of the diagonal alone where the level is too large for it."""
+    if row_sum.size <= 4 * MAX_COARSE:
+        return _dense_inverse(couplings, row_sum)
+    diagonal = _diagonal(couplings.indptr, couplings.data, row_sum)
     return np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)
 
 
-def _dense_inverse(graph: Rows, excess: Singles) -> Singles:
-    size = excess.size
+def _dense_inverse(couplings: CSRMatrix, row_sum: Float32Array) -> Float32Array:
+    """The pseudo-inverse, symmetric in spite of rounding."""
+    size = row_sum.size
     if size == 0:
         return np.zeros((0, 0), np.float32)
     matrix = np.zeros((size, size))
-    row = np.repeat(np.arange(size), np.diff(graph.start))
-    np.add.at(matrix, (row, graph.column), -graph.value.astype(np.float64))
-    matrix[np.diag_indices(size)] += excess - matrix.sum(axis=1)
+    row = np.repeat(np.arange(size), np.diff(couplings.indptr))
+    np.add.at(matrix, (row, couplings.indices), -couplings.data.astype(np.float64))
+    matrix[np.diag_indices(size)] += row_sum - matrix.sum(axis=1)
     return np.linalg.pinv((matrix + matrix.T) / 2, hermitian=True).astype(np.float32)
 
 
 @njit(cache=True, parallel=True)
-def _diagonal(start, value, excess):
-    diagonal = np.empty(excess.size, np.float32)
-    for i in prange(excess.size):
-        total = np.float64(excess[i])
-        for e in range(start[i], start[i + 1]):
-            total += value[e]
+def _diagonal(indptr, data, row_sum):
+    diagonal = np.empty(row_sum.size, np.float32)
+    for i in prange(row_sum.size):
+        total = np.float64(row_sum[i])
+        for e in range(indptr[i], indptr[i + 1]):
+            total += data[e]
         diagonal[i] = total
     return diagonal
 
 
 @njit(cache=True)
 def _product(matrix, b):
-    """A small dense product: BLAS would wake threads of its own, which then wait where ours want to work."""
+    """A small dense product: BLAS would wake threads of its own, which then compete with ours."""
     out = np.zeros(matrix.shape[0], matrix.dtype)
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
