@@ -236,8 +236,10 @@ class _System:
         return x.to(b.dtype)
 
     def _solve_by_kernels(self, apply: Map, b: Tensor, x: Tensor, target: Tensor) -> Tensor:
-        """By `refine.solvers`, a sample at a time. Its coefficients are float32, so it solves again for the residual of its
-        solution."""
+        """By `refine.solvers`, a sample at a time.
+
+        Its coefficients are float32, so the residual of its solution is solved for again.
+        """
         if not all(bool(part.isfinite().all()) for part in self._singles):
             return x  # which is then found to be no solution
         if not self._kernels:
