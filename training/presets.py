@@ -18,11 +18,12 @@ from typing import Any, Literal, get_args
 
 from stereoforge_kit.matching import SGBMParameters
 from training.data.augmentation import AugmentationConfig
+from training.data.sampling import SamplingConfig
 from training.errors import TrainingError
 from training.losses import STAGE_WEIGHTS, STATIC_WEIGHTS, ScaleWeights
 from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
+from training.networks.regressor_free import FREE_FEATURES
 from training.networks.regressors.dispnet import STRIDE
-from training.prediction.regressor_free import FREE_FEATURES
 
 Task = Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free", "joint"]
 TASKS: tuple[Task, ...] = get_args(Task)
@@ -47,32 +48,19 @@ class OptimizerConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Preset:
+class Preset(SamplingConfig):
     """What every training run has."""
 
     steps: int
     """Optimizer steps."""
-    batch_size: int
-    """Crops a step (and a process)."""
-    crop_width: int
-    crop_height: int
-    """Size of the crops in pixels, multiples of 64."""
     optimizer: OptimizerConfig
-    augmentation: AugmentationConfig = field(default_factory=AugmentationConfig)
-    validation_interval: int = 1000
-    """Steps between validations, each of which writes a checkpoint."""
-    validation_samples: int = 50
-    """Validation frames looked at, evenly spread over the split."""
     ema_decay: float | None = None
-    """Validate and keep an exponential moving average of the weights with this decay a step; None keeps the weights
-    themselves."""
-    curriculum: float = 0.0
-    """Share of the run over which the crops come from a growing first part of every data set, in its own order, so that
-    one rendered from simple to complex is seen that way; 0 draws from all from the beginning (ours)."""
+    """Decay per step of an exponential moving average of the weights, which is then what is validated and kept; None
+    keeps the weights themselves."""
     fixed_statistics: float = 0.0
-    """Share of the run, its last, over which BatchNorm normalises by fixed statistics, as it does on frames, and the
-    weights get used to them: 0 leaves every batch its own to the end, 1 keeps those of the network that the run starts
-    from (ours)."""
+    """Share of the run, at its end, over which BatchNorm normalises by fixed statistics, as it does in prediction, so
+    that the weights adapt to them (ours). 0 normalises every batch by its own statistics to the end; 1 keeps the
+    statistics of the network that the run starts from."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,13 +14,13 @@ from tests.training.synthetic import random_layer, random_pair, render, write_da
 from training.data.augmentation import NO_AUGMENTATION
 from training.errors import TrainingError
 from training.metrics import optimal_auc, sparsification_auc
-from training.prediction.predictor import FreePredictor
-from training.prediction.regressor_free import (
+from training.networks.regressor_free import (
     FREE_FEATURES,
     as_free_inputs,
     disparity_features,
     match_batch,
 )
+from training.prediction.predictor import FreePredictor
 from training.presets import FreeConfNetPreset, FreeGradNetPreset, find_preset
 from training.runs.train import train
 from training.runs.weights import load_confnet

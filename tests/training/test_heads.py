@@ -25,8 +25,8 @@ from training.networks.cost_features import (
     Evidence,
     smooth_slopes,
 )
+from training.networks.inference import head_inputs, regress, regress_consistently
 from training.networks.regressors.dispnet import FeatureKind
-from training.prediction.inference import head_inputs, regress, regress_consistently
 
 
 @pytest.mark.parametrize(

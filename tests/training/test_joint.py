@@ -24,7 +24,7 @@ from training.data.augmentation import NO_AUGMENTATION
 from training.data.pipeline import Batch
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
-from training.prediction.inference import HeadInputs, Regression
+from training.networks.inference import HeadInputs, Regression
 from training.prediction.predictor import StereoPredictor
 from training.presets import JointPreset, Preset, RegressorPreset, find_preset
 from training.runs.train import train

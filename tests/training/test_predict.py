@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, DispNetOutput, GradNet, HeadConfig
 from training.networks.cost_features import Evidence
-from training.prediction.inference import estimate
+from training.networks.inference import estimate
 from training.prediction.predictor import StereoPredictor
 from training.runs.weights import TrainingSummary, load_gradnet, load_regressor, read_summary, save_weights
 

@@ -17,7 +17,7 @@ from training.networks import (
     left_right_consistency,
     predict_right,
 )
-from training.prediction.inference import regress
+from training.networks.inference import regress
 from training.presets import (
     PRESETS,
     ConfNetPreset,

@@ -23,10 +23,10 @@ from datagen.sources.registry import open_source
 from datagen.sources.stereo_frame import StereoFrame
 from datagen.sources.webdataset import ShardFrames
 from training.data.augmentation import IDENTITY_CURVE, StereoPair, TrainingSample, Window, augment, cut
+from training.data.fingerprint import data_fingerprint
+from training.data.sampling import SamplingConfig
 from training.errors import TrainingError
 from training.networks.regressors.dispnet import STRIDE
-from training.presets import Preset
-from training.runs.provenance import data_fingerprint
 
 DEFAULT_CACHE_BYTES = 2 << 30
 IMAGE_MEAN_FRAMES = 100
@@ -45,7 +45,7 @@ class Source:
     frames: Sequence[StereoFrame]
     weight: float = 1.0
     fingerprint: str = ""
-    """What identifies the frames (`training.runs.provenance`)."""
+    """What identifies the frames (`training.data.fingerprint`)."""
 
 
 def read_pair(frame: StereoFrame) -> StereoPair:
@@ -153,24 +153,29 @@ class CropDataset(Dataset[Batch]):
     """Draw number to augmented crop."""
 
     def __init__(
-        self, cache: PairCache, schedule: NDArray[np.int64], preset: Preset, seed: int, draws_per_step: int
+        self,
+        cache: PairCache,
+        schedule: NDArray[np.int64],
+        sampling: SamplingConfig,
+        seed: int,
+        draws_per_step: int,
     ) -> None:
         self._cache = cache
         self._schedule = schedule
-        self._preset = preset
+        self._sampling = sampling
         self._seed = seed
         self._draws_per_step = draws_per_step
 
     def __getitem__(self, draw: int) -> Batch:
         source, frame = (int(number) for number in self._schedule[draw])
-        size = (self._preset.crop_height, self._preset.crop_width)
+        size = (self._sampling.crop_height, self._sampling.crop_width)
         pair = self._cache[source, frame]
         if pair.left.shape[0] < size[0] or pair.left.shape[1] < size[1]:
             found = pair.left.shape[:2]
             raise TrainingError(too_small(self._cache.name(source, frame), found, size, found))
         rng = np.random.default_rng([self._seed, 2, draw])
         return as_tensors(
-            augment(rng, pair, size, self._preset.augmentation, step=draw // self._draws_per_step)
+            augment(rng, pair, size, self._sampling.augmentation, step=draw // self._draws_per_step)
         )
 
 
@@ -207,20 +212,20 @@ class StereoDataModule(pl.LightningDataModule):
         self,
         sources: Sequence[Source],
         validation: Sequence[StereoFrame],
-        preset: Preset,
+        sampling: SamplingConfig,
         steps: int,
         seed: int,
         workers: int = 0,
         cache_bytes: int = DEFAULT_CACHE_BYTES,
     ) -> None:
         super().__init__()
-        self._preset = preset
+        self._sampling = sampling
         self._steps = steps
         self._seed = seed
         self._workers = workers
         self._sources = sources
         self._cache = PairCache(sources, cache_bytes)
-        spread = np.linspace(0, len(validation) - 1, min(preset.validation_samples, len(validation)))
+        spread = np.linspace(0, len(validation) - 1, min(sampling.validation_samples, len(validation)))
         self._validation = FrameDataset([validation[round(i)] for i in spread])
 
     def image_mean(self) -> NDArray[np.float32]:
@@ -236,13 +241,15 @@ class StereoDataModule(pl.LightningDataModule):
 
     def block(self, number: int, rank: int = 0, processes: int = 1) -> DataLoader[Batch]:
         """The crops of the steps [number * validation_interval, (number + 1) * validation_interval)."""
-        size = self._preset.batch_size
+        size = self._sampling.batch_size
         per_step = size * processes
-        schedule = schedule_draws(self._sources, self._steps * per_step, self._seed, self._preset.curriculum)
-        interval = self._preset.validation_interval
+        schedule = schedule_draws(
+            self._sources, self._steps * per_step, self._seed, self._sampling.curriculum
+        )
+        interval = self._sampling.validation_interval
         steps = range(number * interval, min((number + 1) * interval, self._steps))
         batches = [list(range(s * per_step + rank * size, s * per_step + (rank + 1) * size)) for s in steps]
-        crops = CropDataset(self._cache, schedule, self._preset, self._seed, per_step)
+        crops = CropDataset(self._cache, schedule, self._sampling, self._seed, per_step)
         return DataLoader(crops, batch_sampler=batches, num_workers=self._workers)
 
     def val_dataloader(self) -> DataLoader[Batch] | list[DataLoader[Batch]]:

@@ -15,7 +15,7 @@ from torch.onnx import OnnxExporterError
 from stereoforge_kit.files import temporary_folder, write_bytes
 from training.errors import TrainingError
 from training.networks import ConfNet, Correlation1D, DispNetCorr1D, GradNet
-from training.prediction.inference import head_inputs, network_size
+from training.networks.inference import head_inputs, network_size
 from training.prediction.predictor import StereoPredictor
 
 FILE_NAME = "stereoforge.onnx"

@@ -13,8 +13,8 @@ from torch import Tensor
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.networks.cost_features import Evidence
-from training.prediction.inference import estimate
-from training.prediction.regressor_free import FreeInputs, as_free_inputs
+from training.networks.inference import estimate
+from training.networks.regressor_free import FreeInputs, as_free_inputs
 from training.runs.weights import has_weights, load_confnet, load_gradnet, load_regressor, on_regressor
 
 

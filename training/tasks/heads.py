@@ -9,7 +9,7 @@ from torch import Tensor
 
 from training.data.pipeline import Batch
 from training.networks import ConfNet, DispNetCorr1D, GradNet
-from training.prediction.inference import estimate, head_inputs
+from training.networks.inference import estimate, head_inputs
 from training.presets import ConfNetPreset, GradNetPreset, Preset
 from training.tasks.base import StereoTask
 from training.tasks.head_objectives import ConfidenceTask, GradientTask

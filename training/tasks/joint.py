@@ -26,7 +26,7 @@ from training.metrics import (
     sparsification_auc,
 )
 from training.networks import ConfNet, DispNetCorr1D, GradNet
-from training.prediction.inference import HeadInputs, estimate, head_inputs
+from training.networks.inference import HeadInputs, estimate, head_inputs
 from training.presets import JointPreset
 from training.tasks.base import image_of, map_of
 from training.tasks.heads import HeadTask

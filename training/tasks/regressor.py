@@ -12,7 +12,7 @@ from training.data.pipeline import Batch
 from training.losses import gradient_aware_l1, multiscale_l1, stage_weights
 from training.metrics import bad_rate, end_point_error, forward_differences, gradient_error
 from training.networks import DispNetCorr1D, full_resolution
-from training.prediction.inference import estimate
+from training.networks.inference import estimate
 from training.presets import FineTuningPreset, RegressorPreset
 from training.tasks.base import StereoTask, image_of, map_of
 

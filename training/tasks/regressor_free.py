@@ -8,7 +8,7 @@ from torch import Tensor
 from training.data.pipeline import Batch
 from training.networks import ConfNet, GradNet
 from training.networks.cost_features import Evidence
-from training.prediction.regressor_free import match_batch
+from training.networks.regressor_free import match_batch
 from training.presets import FreeConfNetPreset, FreeGradNetPreset
 from training.tasks.head_objectives import ConfidenceTask, GradientTask
 
