@@ -6,6 +6,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -21,7 +22,6 @@ from refine.methods.ours import Ours
 from stereoforge.cli import main
 from tests.training.synthetic import write_dataset
 from training.data.augmentation import NO_AUGMENTATION
-from training.data.pipeline import Batch
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
 from training.networks.inference import HeadInputs, Regression
@@ -35,6 +35,17 @@ HEIGHT, WIDTH = 32, 40
 HEAD = HeadConfig(feature_channels=4, width=8, hidden=8, dropout=0.0)
 
 
+class GivenBatch(NamedTuple):
+    """As much of a `StereoBatch` as the task reads, and what the regressor is taken to answer."""
+
+    left: Tensor
+    disparity: Tensor
+    gradient: Tensor
+    initial: Tensor
+    features: Tensor
+    consistency: Tensor
+
+
 class GivenTask(JointTask):
     """A joint task about given disparities and features, whatever the regressor says."""
 
@@ -43,16 +54,13 @@ class GivenTask(JointTask):
         heads = JointHeads(ConfNet(HEAD), GradNet(HEAD))
         super().__init__(preset, DispNetCorr1D(DispNetConfig(width=0.0625)), heads, refinement, 1, 0)
 
-    def inputs(self, batch: Batch) -> HeadInputs:
-        seen = batch["left"], batch["features"]
-        return HeadInputs(
-            Regression(batch["initial"], batch["features"], batch["features"]),
-            (*seen, batch["consistency"]),
-            seen,
-        )
+    def inputs(self, batch: GivenBatch) -> HeadInputs:  # type: ignore[override]
+        seen = batch.left, batch.features
+        regression = Regression(batch.initial, batch.features, batch.features)
+        return HeadInputs(regression, (*seen, batch.consistency), seen)
 
 
-def given_batch(samples: int = 2) -> Batch:
+def given_batch(samples: int = 2) -> GivenBatch:
     """Planes with a wrong box each, which one of the features gives away; flat colours, so that slopes carry far."""
     rng = np.random.default_rng(0)
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
@@ -71,7 +79,9 @@ def given_batch(samples: int = 2) -> Batch:
         "features": features,
         "consistency": np.zeros_like(truth),
     }
-    return {name: torch.from_numpy(values.astype(np.float32)) for name, values in arrays.items()}
+    return GivenBatch(
+        **{name: torch.from_numpy(values.astype(np.float32)) for name, values in arrays.items()}
+    )
 
 
 def joint(**changes: object) -> JointPreset:
@@ -80,10 +90,10 @@ def joint(**changes: object) -> JointPreset:
     return replace(preset, **changes)  # type: ignore[arg-type]
 
 
-def refined(task: JointTask, batch: Batch) -> Tensor:
+def refined(task: JointTask, batch: GivenBatch) -> Tensor:
     (disparity, *_), confnet_sees, gradnet_sees = task.inputs(batch)
     logits, gradient = task.network.confnet(*confnet_sees), task.network.gradnet(*gradnet_sees)
-    return task.refine(batch["left"], disparity, logits, gradient)
+    return task.refine(batch.left, disparity, logits, gradient)
 
 
 @pytest.mark.parametrize("form", ["exact", "paper"])
@@ -91,20 +101,20 @@ def test_refines_as_the_method_does(form: str) -> None:
     """What is trained through is `Ours` with its parameters and its shape of the confidence."""
     ours = Ours(MRFParameters(30.0, 1.0, 4.0), ConfidenceShape(0.7, 2.0), form=form)  # type: ignore[arg-type]
     task, batch = GivenTask(joint(tolerance=1e-7), ours), given_batch(1)
-    batch["left"] = (batch["left"] * 255).round() / 255
+    batch = batch._replace(left=(batch.left * 255).round() / 255)
     (disparity, *_), confnet_sees, gradnet_sees = task.inputs(batch)
     with torch.no_grad():
         got = refined(task, batch)[0, 0]
         confidence = task.network.confnet.confidence(*confnet_sees)[0, 0].numpy()
         gradient = task.network.gradnet(*gradnet_sees)[0].permute(1, 2, 0).numpy()
-    image = (batch["left"][0] * 255).round().byte().permute(1, 2, 0).numpy()
+    image = (batch.left[0] * 255).round().byte().permute(1, 2, 0).numpy()
     expected = ours.solve(disparity[0, 0].numpy(), confidence, gradient, image).disparity
     np.testing.assert_allclose(got, expected, atol=2e-3)
 
 
 def test_slopes_reach_every_weight_of_both_heads_and_none_of_the_regressor() -> None:
     task, batch = GivenTask(joint(), Ours()), given_batch()
-    (refined(task, batch) - batch["disparity"]).abs().mean().backward()
+    (refined(task, batch) - batch.disparity).abs().mean().backward()
     for head in (task.network.confnet, task.network.gradnet):
         for name, parameter in head.named_parameters():
             assert parameter.grad is not None, name
@@ -117,19 +127,16 @@ def test_pixels_without_truth_neither_count_nor_poison() -> None:
     losses, slopes = [], []
     for missing in (False, True):
         if missing:
-            batch["disparity"] = batch["disparity"].clone()
-            batch["disparity"][1] = torch.nan
-            batch["gradient"][1] = torch.nan
-        else:
-            first = {name: tensor[:1] for name, tensor in batch.items()}
+            batch.disparity[1] = torch.nan
+            batch.gradient[1] = torch.nan
         task.network.zero_grad()
-        loss = task.loss(batch if missing else first)
+        loss = task.loss(batch if missing else GivenBatch(*(tensor[:1] for tensor in batch)))
         loss.backward()
         losses.append(loss.item())
         slopes.append(torch.cat([p.grad.flatten() for p in task.network.parameters() if p.grad is not None]))
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
     torch.testing.assert_close(*slopes, rtol=1e-2, atol=1e-3)
-    batch["disparity"][:], batch["gradient"][:] = torch.nan, torch.nan
+    batch.disparity[:], batch.gradient[:] = torch.nan, torch.nan
     task.network.zero_grad()
     task.loss(batch).backward()
     assert all(p.grad is not None and p.grad.isfinite().all() for p in task.network.parameters())
@@ -147,8 +154,7 @@ def test_overfits_two_samples() -> None:
         optimizer.step()
         losses.append(loss.item())
     error, before = (
-        (disparity - batch["disparity"]).abs().mean()
-        for disparity in (refined(task, batch), batch["initial"])
+        (disparity - batch.disparity).abs().mean() for disparity in (refined(task, batch), batch.initial)
     )
     assert error < 0.3 * before
     assert losses[-1] < 0.3 * losses[0]

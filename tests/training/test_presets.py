@@ -6,6 +6,7 @@ from dataclasses import fields, is_dataclass, replace
 import pytest
 import torch
 
+from training.data.batch import StereoBatch
 from training.losses import STAGE_WEIGHTS
 from training.metrics import bad_rate, gradient_error, optimal_auc, sparsification_auc
 from training.networks import (
@@ -110,13 +111,10 @@ def test_the_full_loss_weighs_the_scales_of_the_step(step: int, monkeypatch: pyt
     task = narrow_task()
     monkeypatch.setattr(type(task), "global_step", property(lambda _: step))
     torch.manual_seed(0)
-    batch = {"left": torch.rand(1, 3, 64, 64), "right": torch.rand(1, 3, 64, 64)}
-    batch["disparity"] = torch.full((1, 1, 64, 64), 7.0)
+    left, right = torch.rand(1, 3, 64, 64), torch.rand(1, 3, 64, 64)
+    batch = StereoBatch(left, right, torch.full((1, 1, 64, 64), 7.0), torch.zeros(1, 2, 64, 64))
     with torch.no_grad():
-        errors = [
-            (torch.relu(d) - 7.0).abs().mean().item()
-            for d in task.network(batch["left"], batch["right"]).disparities
-        ]
+        errors = [(torch.relu(d) - 7.0).abs().mean().item() for d in task.network(left, right).disparities]
         loss = task.loss(batch).item()
     row = STAGE_WEIGHTS[min(step // 100_000, 6)]
     assert loss == pytest.approx(sum(w * e for w, e in zip(row, errors, strict=True)), rel=1e-5)
@@ -133,7 +131,7 @@ def test_full_heads_see_the_features_and_the_mirrored_consistency() -> None:
     confnet = ConfNetTask(presets["confnet"], regressor, ConfNet(presets["confnet"].network), 1, 0)
     gradnet = GradNetTask(presets["gradnet"], regressor, GradNet(presets["gradnet"].network), 1, 0)
     left, right = torch.rand(2, 1, 3, 64, 128)
-    batch = {"left": left, "right": right}
+    batch = StereoBatch(left, right, torch.zeros(1, 1, 64, 128), torch.zeros(1, 2, 64, 128))
     (image, features, consistency), disparity = confnet.head_inputs(batch)
     assert (image.shape[1], features.shape[1], consistency.shape[1]) == (3, 97, 1)
     with torch.no_grad():

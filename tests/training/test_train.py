@@ -328,7 +328,7 @@ def test_recipes_for_sparse_real_data(run: Path, tmp_path: Path) -> None:
             GradNetTask,
             "loss",
             lambda self, batch: (
-                seen.append(torch.isnan(batch["disparity"]).float().mean().item()) or loss(self, batch)
+                seen.append(torch.isnan(batch.disparity).float().mean().item()) or loss(self, batch)
             ),
         )
         train(

@@ -16,13 +16,13 @@ import numpy as np
 import pytorch_lightning as pl
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
 from datagen.sources.registry import open_source
 from datagen.sources.stereo_frame import StereoFrame
 from datagen.sources.webdataset import ShardFrames
 from training.data.augmentation import IDENTITY_CURVE, StereoPair, TrainingSample, Window, augment, cut
+from training.data.batch import StereoBatch
 from training.data.fingerprint import data_fingerprint
 from training.data.sampling import SamplingConfig
 from training.errors import TrainingError
@@ -33,9 +33,6 @@ IMAGE_MEAN_FRAMES = 100
 SHARDS_TOGETHER = 8
 CURRICULUM_PARTS = 10
 """A curriculum adds a tenth of every data set at a time."""
-
-Batch = dict[str, Tensor]
-"""`left`, `right` (B, 3, H, W) in 0..1, `disparity` (B, 1, H, W), `gradient` (B, 2, H, W), NaN invalid."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +146,7 @@ def shuffle(rng: np.random.Generator, frames: Sequence[StereoFrame]) -> NDArray[
     )
 
 
-class CropDataset(Dataset[Batch]):
+class CropDataset(Dataset[StereoBatch]):
     """Draw number to augmented crop."""
 
     def __init__(
@@ -166,7 +163,7 @@ class CropDataset(Dataset[Batch]):
         self._seed = seed
         self._draws_per_step = draws_per_step
 
-    def __getitem__(self, draw: int) -> Batch:
+    def __getitem__(self, draw: int) -> StereoBatch:
         source, frame = (int(number) for number in self._schedule[draw])
         size = (self._sampling.crop_height, self._sampling.crop_width)
         pair = self._cache[source, frame]
@@ -179,7 +176,7 @@ class CropDataset(Dataset[Batch]):
         )
 
 
-class FrameDataset(Dataset[Batch]):
+class FrameDataset(Dataset[StereoBatch]):
     """Whole frames, as they are."""
 
     def __init__(self, frames: Sequence[StereoFrame]) -> None:
@@ -188,21 +185,21 @@ class FrameDataset(Dataset[Batch]):
     def __len__(self) -> int:
         return len(self._frames)
 
-    def __getitem__(self, index: int) -> Batch:
+    def __getitem__(self, index: int) -> StereoBatch:
         pair = read_pair(self._frames[index])
         height, width = pair.disparity_left.shape
         whole = cut(pair, Window(0.0, 0.0, 1.0, 1.0), (height, width), (IDENTITY_CURVE, IDENTITY_CURVE))
         return as_tensors(whole)
 
 
-def as_tensors(sample: TrainingSample) -> Batch:
-    """One sample, channels first."""
-    return {
-        "left": torch.from_numpy(sample.left).permute(2, 0, 1).contiguous(),
-        "right": torch.from_numpy(sample.right).permute(2, 0, 1).contiguous(),
-        "disparity": torch.from_numpy(sample.disparity)[None],
-        "gradient": torch.from_numpy(sample.gradient).permute(2, 0, 1).contiguous(),
-    }
+def as_tensors(sample: TrainingSample) -> StereoBatch:
+    """One sample as tensors, channels first."""
+    return StereoBatch(
+        left=torch.from_numpy(sample.left).permute(2, 0, 1).contiguous(),
+        right=torch.from_numpy(sample.right).permute(2, 0, 1).contiguous(),
+        disparity=torch.from_numpy(sample.disparity)[None],
+        gradient=torch.from_numpy(sample.gradient).permute(2, 0, 1).contiguous(),
+    )
 
 
 class StereoDataModule(pl.LightningDataModule):
@@ -234,12 +231,12 @@ class StereoDataModule(pl.LightningDataModule):
         mean: NDArray[np.float32] = np.mean([image.mean((0, 1)) for image in images], axis=0) / 255
         return mean.astype(np.float32)
 
-    def train_dataloader(self) -> DataLoader[Batch]:
+    def train_dataloader(self) -> DataLoader[StereoBatch]:
         """The crops of the current block; with several processes, this process's share of every step."""
         assert self.trainer is not None
         return self.block(self.trainer.current_epoch, self.trainer.global_rank, self.trainer.world_size)
 
-    def block(self, number: int, rank: int = 0, processes: int = 1) -> DataLoader[Batch]:
+    def block(self, number: int, rank: int = 0, processes: int = 1) -> DataLoader[StereoBatch]:
         """The crops of the steps [number * validation_interval, (number + 1) * validation_interval)."""
         size = self._sampling.batch_size
         per_step = size * processes
@@ -252,7 +249,7 @@ class StereoDataModule(pl.LightningDataModule):
         crops = CropDataset(self._cache, schedule, self._sampling, self._seed, per_step)
         return DataLoader(crops, batch_sampler=batches, num_workers=self._workers)
 
-    def val_dataloader(self) -> DataLoader[Batch] | list[DataLoader[Batch]]:
+    def val_dataloader(self) -> DataLoader[StereoBatch] | list[DataLoader[StereoBatch]]:
         return DataLoader(self._validation, batch_size=1) if len(self._validation) else []
 
 

@@ -16,7 +16,7 @@ from torch.nn.modules.batchnorm import _BatchNorm
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from stereoforge_kit.viewing import Picture
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.errors import TrainingError
 from training.presets import OptimizerConfig, Preset
 
@@ -65,27 +65,27 @@ class StereoTask(pl.LightningModule):
         """The network that is validated and saved: the one trained, or its moving average."""
         return self.network if self._averaged is None else self._averaged.module
 
-    def on_train_batch_end(self, outputs: Any, batch: Batch, batch_idx: int) -> None:  # noqa: ARG002
+    def on_train_batch_end(self, outputs: Any, batch: StereoBatch, batch_idx: int) -> None:  # noqa: ARG002
         if self._averaged is not None:
             self._averaged.update_parameters(self.network)
 
     @abstractmethod
-    def loss(self, batch: Batch) -> Tensor:
+    def loss(self, batch: StereoBatch) -> Tensor:
         """The loss of a batch of crops."""
 
     @abstractmethod
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
         """Figures of one whole frame, and the maps its panel shows."""
 
     @abstractmethod
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
         """The picture of a validation frame."""
 
     def decayed_parameters(self) -> Iterable[nn.Parameter]:
         """Parameters with weight decay: all that are trained, unless a task knows better."""
         return (p for p in self.network.parameters() if p.requires_grad)
 
-    def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:  # noqa: ARG002
+    def on_train_batch_start(self, batch: StereoBatch, batch_idx: int) -> None:  # noqa: ARG002
         # Dropout draws from torch's global generator; a state that follows from the step makes an interrupted
         # run continue as if it had not been. `train` guards the caller's own state.
         entropy = np.random.SeedSequence([self.seed, 3, self.global_step, self.global_rank])
@@ -101,7 +101,7 @@ class StereoTask(pl.LightningModule):
     @torch.no_grad()
     def _measure_statistics(self, norms: Sequence[_BatchNorm]) -> None:
         """Give BatchNorm the mean of many batches' statistics in place of a trace of the last few, by which
-        validation errors swing (Wu and Johnson, "Rethinking 'Batch' in BatchNorm", 2021)."""
+        validation errors swing (Wu and Johnson, "Rethinking 'StereoBatch' in BatchNorm", 2021)."""
         data = self.trainer.datamodule
         batches = data.block(self.trainer.current_epoch, self.trainer.global_rank, self.trainer.world_size)
         momenta = [norm.momentum for norm in norms]
@@ -113,18 +113,18 @@ class StereoTask(pl.LightningModule):
         for norm, momentum in zip(norms, momenta, strict=True):
             norm.momentum = momentum
 
-    def training_step(self, batch: Batch, batch_idx: int) -> Tensor:  # noqa: ARG002
+    def training_step(self, batch: StereoBatch, batch_idx: int) -> Tensor:  # noqa: ARG002
         loss = self.loss(batch)
         if not torch.isfinite(loss):
             raise TrainingError(
                 f"the loss of step {self.global_step} is {loss.item()}, so training stopped; the last checkpoint "
                 f"is whole, and a smaller learning rate or gradient clipping usually helps"
             )
-        self.log("train/loss", loss.detach(), batch_size=len(batch["left"]), sync_dist=True)
+        self.log("train/loss", loss.detach(), batch_size=len(batch.left), sync_dist=True)
         self.log("train/learning_rate", self.optimizers().param_groups[0]["lr"])
         return loss
 
-    def validation_step(self, batch: Batch, batch_idx: int) -> None:
+    def validation_step(self, batch: StereoBatch, batch_idx: int) -> None:
         figures, maps = self.validate_frame(batch)
         answered = not any(bool(torch.isnan(each).all()) for each in maps.values())
         for name, value in figures.items():

@@ -15,7 +15,7 @@ from stereoforge_kit.viewing import (
     gradient_picture,
     side_by_side,
 )
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.losses import confidence_cross_entropy, masked_gradient_l1
 from training.metrics import bad_rate, forward_differences, gradient_error, optimal_auc, sparsification_auc
 from training.networks import ConfNet, GradNet
@@ -26,11 +26,11 @@ class DisparityTask(StereoTask):
     """A network that learns something about a disparity it is given."""
 
     @abstractmethod
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+    def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
         """What the network sees of training crops, and the disparity it is about."""
 
     @abstractmethod
-    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
+    def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
         """The disparity, and what the kept network says of it, of a frame of any size."""
 
 
@@ -41,16 +41,16 @@ class ConfidenceTask(DisparityTask):
     network: ConfNet
     correct_within_px: float
 
-    def loss(self, batch: Batch) -> Tensor:
+    def loss(self, batch: StereoBatch) -> Tensor:
         inputs, disparity = self.head_inputs(batch)
         return confidence_cross_entropy(
-            self.network(*inputs), disparity, batch["disparity"], self.correct_within_px
+            self.network(*inputs), disparity, batch.disparity, self.correct_within_px
         )
 
     @torch.no_grad()
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
         disparity, confidence = self.predict(batch)
-        truth, threshold = batch["disparity"], self.correct_within_px
+        truth, threshold = batch.disparity, self.correct_within_px
         rate = bad_rate(disparity, truth, threshold)
         figures = {
             "auc": sparsification_auc(confidence, disparity, truth, threshold),
@@ -59,11 +59,11 @@ class ConfidenceTask(DisparityTask):
         }
         return figures, {"disparity": disparity, "confidence": confidence}
 
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
-        error = map_of(maps["disparity"] - batch["disparity"])
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        error = map_of(maps["disparity"] - batch.disparity)
         return side_by_side(
             [
-                image_of(batch["left"]),
+                image_of(batch.left),
                 error_picture(error, self.correct_within_px),
                 confidence_picture(map_of(maps["confidence"])),
             ]
@@ -79,20 +79,20 @@ class GradientTask(DisparityTask):
     initial: ClassVar[str]
     """What the disparity comes from, whose own gradients are the ones to do better than."""
 
-    def loss(self, batch: Batch) -> Tensor:
+    def loss(self, batch: StereoBatch) -> Tensor:
         inputs, _ = self.head_inputs(batch)
-        return masked_gradient_l1(self.network(*inputs), batch["gradient"], self.threshold_px)
+        return masked_gradient_l1(self.network(*inputs), batch.gradient, self.threshold_px)
 
     @torch.no_grad()
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
         disparity, gradient = self.predict(batch)
         own = forward_differences(disparity)
         figures = {
-            "gradient": gradient_error(gradient, batch["gradient"], self.threshold_px),
-            f"gradient_{self.initial}": gradient_error(own, batch["gradient"], self.threshold_px),
+            "gradient": gradient_error(gradient, batch.gradient, self.threshold_px),
+            f"gradient_{self.initial}": gradient_error(own, batch.gradient, self.threshold_px),
         }
         return figures, {"gradient": gradient, "own": own}
 
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
-        gradients = (batch["gradient"], maps["gradient"], maps["own"])
-        return side_by_side([image_of(batch["left"]), *(gradient_picture(map_of(g)) for g in gradients)])
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        gradients = (batch.gradient, maps["gradient"], maps["own"])
+        return side_by_side([image_of(batch.left), *(gradient_picture(map_of(g)) for g in gradients)])

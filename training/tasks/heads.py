@@ -7,7 +7,7 @@ from typing import Self
 import torch
 from torch import Tensor
 
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.networks.inference import estimate, head_inputs
 from training.presets import ConfNetPreset, GradNetPreset, Preset
@@ -38,15 +38,13 @@ class ConfNetTask(HeadTask, ConfidenceTask):
         self.network = network
         self.correct_within_px = preset.correct_within_px
 
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+    def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
         with torch.no_grad():  # the regressor runs once
-            seen = head_inputs(self.regressor, self.network, None, batch["left"], batch["right"])
+            seen = head_inputs(self.regressor, self.network, None, batch.left, batch.right)
         return seen.confnet, seen.regression.disparity
 
-    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        disparity, confidence, _ = estimate(
-            self.regressor, self.kept_network, None, batch["left"], batch["right"]
-        )
+    def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
+        disparity, confidence, _ = estimate(self.regressor, self.kept_network, None, batch.left, batch.right)
         assert confidence is not None
         return disparity, confidence
 
@@ -63,14 +61,12 @@ class GradNetTask(HeadTask, GradientTask):
         self.network = network
         self.threshold_px = preset.gradient_threshold_px
 
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+    def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
         with torch.no_grad():
-            seen = head_inputs(self.regressor, None, self.network, batch["left"], batch["right"])
+            seen = head_inputs(self.regressor, None, self.network, batch.left, batch.right)
         return seen.gradnet, seen.regression.disparity
 
-    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        disparity, _, gradient = estimate(
-            self.regressor, None, self.kept_network, batch["left"], batch["right"]
-        )
+    def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
+        disparity, _, gradient = estimate(self.regressor, None, self.kept_network, batch.left, batch.right)
         assert gradient is not None
         return disparity, gradient

@@ -16,7 +16,7 @@ from stereoforge_kit.viewing import (
     gradient_picture,
     side_by_side,
 )
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.losses import confidence_cross_entropy, masked_gradient_l1, refinement_l1
 from training.metrics import (
     bad_rate,
@@ -65,11 +65,11 @@ class JointTask(HeadTask):
         self.refinement = refinement
         self.losses = preset
 
-    def inputs(self, batch: Batch) -> HeadInputs:
+    def inputs(self, batch: StereoBatch) -> HeadInputs:
         """What the two networks see, from the regressor run once."""
         heads = self.network
         with torch.no_grad():
-            return head_inputs(self.regressor, heads.confnet, heads.gradnet, batch["left"], batch["right"])
+            return head_inputs(self.regressor, heads.confnet, heads.gradnet, batch.left, batch.right)
 
     def refine(self, image: Tensor, disparity: Tensor, logits: Tensor, gradient: Tensor) -> Tensor:
         """The refined disparity (B, 1, H, W), differentiable in ConfNet's logits and GradNet's gradient."""
@@ -86,57 +86,57 @@ class JointTask(HeadTask):
             self.losses.tolerance,
         )[:, None]
 
-    def loss(self, batch: Batch) -> Tensor:
+    def loss(self, batch: StereoBatch) -> Tensor:
         seen = self.inputs(batch)
         disparity = seen.regression.disparity
         logits, gradient = self.network.confnet(*seen.confnet), self.network.gradnet(*seen.gradnet)
         own = confidence_cross_entropy(
-            logits, disparity, batch["disparity"], self.losses.correct_within_px
-        ) + masked_gradient_l1(gradient, batch["gradient"], self.losses.gradient_threshold_px)
+            logits, disparity, batch.disparity, self.losses.correct_within_px
+        ) + masked_gradient_l1(gradient, batch.gradient, self.losses.gradient_threshold_px)
         if self.losses.refined_weight == 0:
             return own
-        refined = self.refine(batch["left"], disparity, logits, gradient)
+        refined = self.refine(batch.left, disparity, logits, gradient)
         through = refinement_l1(
             refined,
-            batch["disparity"],
-            batch["gradient"],
+            batch.disparity,
+            batch.gradient,
             self.losses.refined_gradient_weight,
             self.losses.gradient_threshold_px,
         )
         return own + self.losses.refined_weight * through
 
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
         heads = self.kept_network
         disparity, confidence, gradient = estimate(
-            self.regressor, heads.confnet, heads.gradnet, batch["left"], batch["right"]
+            self.regressor, heads.confnet, heads.gradnet, batch.left, batch.right
         )
         assert confidence is not None
         assert gradient is not None
         image, initial, trust, slopes = (
-            image_of(batch["left"]),
+            image_of(batch.left),
             map_of(disparity),
             map_of(confidence),
             map_of(gradient),
         )
         solved = self.refinement.solve(initial, trust, slopes, image).disparity
         refined = torch.from_numpy(solved).to(disparity)[None, None]
-        truth, threshold = batch["disparity"], self.losses.gradient_threshold_px
+        truth, threshold = batch.disparity, self.losses.gradient_threshold_px
         figures = {
             "refined_epe": end_point_error(refined, truth),
             "refined_bad1": bad_rate(refined, truth, 1.0),
-            "refined_gradient": gradient_error(forward_differences(refined), batch["gradient"], threshold),
-            "gradient": gradient_error(gradient, batch["gradient"], threshold),
+            "refined_gradient": gradient_error(forward_differences(refined), batch.gradient, threshold),
+            "gradient": gradient_error(gradient, batch.gradient, threshold),
             "auc": sparsification_auc(confidence, disparity, truth, self.losses.correct_within_px),
         }
         return figures, {"refined": refined, "confidence": confidence, "gradient": gradient}
 
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
-        nearest = max(float(torch.nan_to_num(batch["disparity"]).max()), 1.0)
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        nearest = max(float(torch.nan_to_num(batch.disparity).max()), 1.0)
         return side_by_side(
             [
-                image_of(batch["left"]),
+                image_of(batch.left),
                 disparity_picture(map_of(maps["refined"]), nearest),
-                error_picture(map_of(maps["refined"] - batch["disparity"]), 1.0),
+                error_picture(map_of(maps["refined"] - batch.disparity), 1.0),
                 confidence_picture(map_of(maps["confidence"])),
                 gradient_picture(map_of(maps["gradient"])),
             ]

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from stereoforge_kit.viewing import Picture, disparity_picture, error_picture, side_by_side
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.losses import gradient_aware_l1, multiscale_l1, stage_weights
 from training.metrics import bad_rate, end_point_error, forward_differences, gradient_error
 from training.networks import DispNetCorr1D, full_resolution
@@ -27,23 +27,23 @@ class _DisparityTask(StereoTask):
     def decayed_parameters(self) -> Iterable[nn.Parameter]:
         return self.network.contracting_weights()
 
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-        disparity = estimate(self.kept_network, None, None, batch["left"], batch["right"]).disparity
-        truth = batch["disparity"]
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+        disparity = estimate(self.kept_network, None, None, batch.left, batch.right).disparity
+        truth = batch.disparity
         figures = {
             "epe": end_point_error(disparity, truth),
             "bad1": bad_rate(disparity, truth, 1.0),
             "bad3": bad_rate(disparity, truth, 3.0),
-            "gradient": gradient_error(forward_differences(disparity), batch["gradient"], SMOOTH_BELOW_PX),
+            "gradient": gradient_error(forward_differences(disparity), batch.gradient, SMOOTH_BELOW_PX),
         }
         return figures, {"disparity": disparity}
 
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
-        truth, disparity = map_of(batch["disparity"]), map_of(maps["disparity"])
-        nearest = float(torch.nan_to_num(batch["disparity"]).max())
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        truth, disparity = map_of(batch.disparity), map_of(maps["disparity"])
+        nearest = float(torch.nan_to_num(batch.disparity).max())
         return side_by_side(
             [
-                image_of(batch["left"]),
+                image_of(batch.left),
                 disparity_picture(truth, max(nearest, 1.0)),
                 disparity_picture(disparity, max(nearest, 1.0)),
                 error_picture(disparity - truth, 1.0),
@@ -60,10 +60,10 @@ class RegressorTask(_DisparityTask):
         self.stages = preset.loss_stages
         self.stage_ends = [round(end * steps / preset.steps) for end in preset.stage_ends]
 
-    def loss(self, batch: Batch) -> Tensor:
-        predictions = self.network(batch["left"], batch["right"]).disparities
+    def loss(self, batch: StereoBatch) -> Tensor:
+        predictions = self.network(batch.left, batch.right).disparities
         weights = stage_weights(self.global_step, self.stages, self.stage_ends)
-        return multiscale_l1(predictions, batch["disparity"], weights)
+        return multiscale_l1(predictions, batch.disparity, weights)
 
 
 class FineTuningTask(_DisparityTask):
@@ -74,7 +74,7 @@ class FineTuningTask(_DisparityTask):
         self.network = network
         self.gradient_weight = preset.gradient_weight
 
-    def loss(self, batch: Batch) -> Tensor:
-        finest = self.network(batch["left"], batch["right"]).disparities[-1]
-        prediction = full_resolution(finest, batch["left"].shape[-2:])
-        return gradient_aware_l1(prediction, batch["disparity"], self.gradient_weight)
+    def loss(self, batch: StereoBatch) -> Tensor:
+        finest = self.network(batch.left, batch.right).disparities[-1]
+        prediction = full_resolution(finest, batch.left.shape[-2:])
+        return gradient_aware_l1(prediction, batch.disparity, self.gradient_weight)

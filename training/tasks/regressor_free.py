@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.networks import ConfNet, GradNet
 from training.networks.cost_features import Evidence
 from training.networks.regressor_free import match_batch
@@ -22,15 +22,15 @@ class FreeConfNetTask(ConfidenceTask):
         self.correct_within_px = preset.correct_within_px
         self.matcher = preset.matcher
 
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+    def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
         with torch.no_grad():
-            left, right = batch["left"], batch["right"]
+            left, right = batch.left, batch.right
             matched = match_batch(left, right, self.matcher)
             evidence = Evidence(left, right, matched.disparity)
             inputs = self.network.inputs(matched.features, matched.consistency, evidence)
         return inputs, matched.disparity
 
-    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
+    def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
         inputs, disparity = self.head_inputs(batch)
         return disparity, self.kept_network.confidence(*inputs)
 
@@ -46,13 +46,13 @@ class FreeGradNetTask(GradientTask):
         self.threshold_px = preset.gradient_threshold_px
         self.matcher = preset.matcher
 
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+    def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
         with torch.no_grad():
-            left, right = batch["left"], batch["right"]
+            left, right = batch.left, batch.right
             matched = match_batch(left, right, self.matcher)
             inputs = self.network.inputs(matched.features, Evidence(left, right, matched.disparity))
         return inputs, matched.disparity
 
-    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
+    def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
         inputs, disparity = self.head_inputs(batch)
         return disparity, self.kept_network(*inputs)
