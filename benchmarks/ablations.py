@@ -40,6 +40,7 @@ from training.presets import (
     Preset,
     RegressorPreset,
 )
+from training.runs.request import TrainingRequest
 from training.runs.train import train
 from training.runs.weights import copy_weights, has_weights
 
@@ -152,10 +153,19 @@ def run(task: str, name: str, preset: Preset, options: argparse.Namespace) -> No
     init = (options.regressor or options.out / "regressor" / "base") if on_regressor else None
     data = options.graded if task == "curriculum" else options.data
     began = time.perf_counter()
-    summary = train(
-        task if on_regressor else "regressor", [(data, 1.0)], folder, preset, validation=[options.data], init=init,
-        steps=steps, seed=options.seed, device="cpu", resume=True,
-    )  # fmt: skip
+    request = TrainingRequest(
+        task=task if on_regressor else "regressor",
+        data=((data, 1.0),),
+        out=folder,
+        preset=preset,
+        validation=(options.data,),
+        init=init,
+        steps=steps,
+        seed=options.seed,
+        device="cpu",
+        resume=True,
+    )
+    summary = train(request)
     row = {
         "name": name,
         "steps": steps,

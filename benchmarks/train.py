@@ -33,10 +33,10 @@ from training.presets import (
     PRESETS,
     ConfNetPreset,
     FineTuningPreset,
-    FreeConfNetPreset,
-    FreeGradNetPreset,
     GradNetPreset,
     Preset,
+    RegressorFreeConfNetPreset,
+    RegressorFreeGradNetPreset,
     RegressorPreset,
     find_preset,
 )
@@ -44,9 +44,9 @@ from training.runs.hardware import faster_layout
 from training.tasks import (
     ConfNetTask,
     FineTuningTask,
-    FreeConfNetTask,
-    FreeGradNetTask,
     GradNetTask,
+    RegressorFreeConfNetTask,
+    RegressorFreeGradNetTask,
     RegressorTask,
     StereoTask,
 )
@@ -73,16 +73,16 @@ def build_task(preset: Preset, regressor_preset: RegressorPreset) -> StereoTask:
         return RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0)
     if isinstance(preset, FineTuningPreset):
         return FineTuningTask(preset, network, preset.steps, 0)
+    if isinstance(preset, RegressorFreeConfNetPreset):
+        return RegressorFreeConfNetTask(preset, ConfNet(preset.network), preset.steps, 0)
+    if isinstance(preset, RegressorFreeGradNetPreset):
+        return RegressorFreeGradNetTask(preset, GradNet(preset.network), preset.steps, 0)
     if isinstance(preset, ConfNetPreset):
         head = ConfNet(preset.network.on(network))
         return ConfNetTask(preset, network, head, preset.steps, 0)
     if isinstance(preset, GradNetPreset):
         grad_head = GradNet(preset.network.on(network))
         return GradNetTask(preset, network, grad_head, preset.steps, 0)
-    if isinstance(preset, FreeConfNetPreset):
-        return FreeConfNetTask(preset, ConfNet(preset.network), preset.steps, 0)
-    if isinstance(preset, FreeGradNetPreset):
-        return FreeGradNetTask(preset, GradNet(preset.network), preset.steps, 0)
     raise TypeError(f"no task trains a {type(preset).__name__}")
 
 

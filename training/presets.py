@@ -22,7 +22,7 @@ from training.data.sampling import SamplingConfig
 from training.errors import TrainingError
 from training.losses import STAGE_WEIGHTS, STATIC_WEIGHTS, ScaleWeights
 from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
-from training.networks.regressor_free import FREE_FEATURES
+from training.networks.regressor_free import REGRESSOR_FREE_CHANNELS
 from training.networks.regressors.dispnet import STRIDE
 
 Task = Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free", "joint"]
@@ -105,7 +105,7 @@ class GradNetPreset(Preset):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreeConfNetPreset(ConfNetPreset):
+class RegressorFreeConfNetPreset(ConfNetPreset):
     """ConfNet on the disparity of semi-global matching, without a regressor (ours)."""
 
     matcher: SGBMParameters = field(default_factory=SGBMParameters)
@@ -113,7 +113,7 @@ class FreeConfNetPreset(ConfNetPreset):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreeGradNetPreset(GradNetPreset):
+class RegressorFreeGradNetPreset(GradNetPreset):
     """GradNet on the disparity of semi-global matching, without a regressor (ours)."""
 
     matcher: SGBMParameters = field(default_factory=SGBMParameters)
@@ -296,36 +296,38 @@ TINY_GRADNET = replace(
 )
 """So short a run learns more where it looks next to a pixel than further around (docs/ablations.md)."""
 
-SMALL_FREE_CONFNET = FreeConfNetPreset(
+SMALL_REGRESSOR_FREE_CONFNET = RegressorFreeConfNetPreset(
     steps=SMALL_CONFNET.steps,
     batch_size=4,
     crop_width=320,
     crop_height=128,
     optimizer=SMALL_CONFNET.optimizer,
     augmentation=SLANTED_AUGMENTATION,
-    network=replace(SMALL_CONFNET.network, feature_channels=FREE_FEATURES, dilations=WIDE_DILATIONS),
+    network=replace(
+        SMALL_CONFNET.network, feature_channels=REGRESSOR_FREE_CHANNELS, dilations=WIDE_DILATIONS
+    ),
     validation_interval=500,
 )
-TINY_FREE_CONFNET = replace(
-    SMALL_FREE_CONFNET,
+TINY_REGRESSOR_FREE_CONFNET = replace(
+    SMALL_REGRESSOR_FREE_CONFNET,
     steps=200,
     augmentation=SMALL_AUGMENTATION,
     optimizer=TINY_CONFNET.optimizer,
     validation_interval=100,
     validation_samples=16,
 )
-SMALL_FREE_GRADNET = FreeGradNetPreset(
+SMALL_REGRESSOR_FREE_GRADNET = RegressorFreeGradNetPreset(
     steps=SMALL_GRADNET.steps,
     batch_size=4,
     crop_width=320,
     crop_height=128,
     optimizer=SMALL_GRADNET.optimizer,
     augmentation=SLANTED_AUGMENTATION,
-    network=replace(SMALL_GRADNET.network, feature_channels=FREE_FEATURES),
+    network=replace(SMALL_GRADNET.network, feature_channels=REGRESSOR_FREE_CHANNELS),
     validation_interval=500,
 )
-TINY_FREE_GRADNET = replace(
-    SMALL_FREE_GRADNET,
+TINY_REGRESSOR_FREE_GRADNET = replace(
+    SMALL_REGRESSOR_FREE_GRADNET,
     steps=200,
     augmentation=SMALL_AUGMENTATION,
     optimizer=TINY_GRADNET.optimizer,
@@ -359,8 +361,8 @@ PRESETS: dict[Task, dict[str, Preset]] = {
     "regressor_f": {"tiny": TINY_FINE_TUNING, "small": SMALL_FINE_TUNING, "full": FULL_FINE_TUNING},
     "confnet": {"tiny": TINY_CONFNET, "small": SMALL_CONFNET, "full": FULL_CONFNET},
     "gradnet": {"tiny": TINY_GRADNET, "small": SMALL_GRADNET, "full": FULL_GRADNET},
-    "confnet_free": {"tiny": TINY_FREE_CONFNET, "small": SMALL_FREE_CONFNET},
-    "gradnet_free": {"tiny": TINY_FREE_GRADNET, "small": SMALL_FREE_GRADNET},
+    "confnet_free": {"tiny": TINY_REGRESSOR_FREE_CONFNET, "small": SMALL_REGRESSOR_FREE_CONFNET},
+    "gradnet_free": {"tiny": TINY_REGRESSOR_FREE_GRADNET, "small": SMALL_REGRESSOR_FREE_GRADNET},
     "joint": {"tiny": TINY_JOINT, "small": SMALL_JOINT},
 }
 

@@ -10,27 +10,27 @@ import pytest
 import torch
 
 from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
+from tests.training.running import train_quietly
 from tests.training.synthetic import random_layer, random_pair, render, write_dataset
 from training.data.augmentation import NO_AUGMENTATION
 from training.errors import TrainingError
 from training.metrics import optimal_auc, sparsification_auc
 from training.networks.regressor_free import (
-    FREE_FEATURES,
-    as_free_inputs,
+    REGRESSOR_FREE_CHANNELS,
     disparity_features,
     match_batch,
+    regressor_free_inputs,
 )
-from training.prediction.predictor import FreePredictor
-from training.presets import FreeConfNetPreset, FreeGradNetPreset, find_preset
-from training.runs.train import train
+from training.prediction.predictor import RegressorFreePredictor
+from training.presets import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset, find_preset
 from training.runs.weights import load_confnet
 
 MATCHER = SGBMParameters(max_disparity_px=48)
 
 
-def quick(task: str) -> FreeConfNetPreset | FreeGradNetPreset:
+def quick(task: str) -> RegressorFreeConfNetPreset | RegressorFreeGradNetPreset:
     preset = find_preset(task, "tiny")
-    assert isinstance(preset, FreeConfNetPreset | FreeGradNetPreset)
+    assert isinstance(preset, RegressorFreeConfNetPreset | RegressorFreeGradNetPreset)
     return replace(
         preset,
         crop_width=128,
@@ -50,7 +50,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     data = write_dataset(tmp_path_factory.mktemp("set"), 0, train=4, val=2)
     folder = tmp_path_factory.mktemp("run")
     for task, steps in {"confnet_free": 150, "gradnet_free": 300}.items():
-        train(task, [(data, 1.0)], folder, quick(task), steps=steps, progress=False)
+        train_quietly(task, [(data, 1.0)], folder, quick(task), steps=steps)
     return folder
 
 
@@ -59,12 +59,12 @@ def test_features_are_what_they_say() -> None:
     disparity = rng.uniform(0, 30, (12, 20)).astype(np.float32)
     disparity[3:5, 4:9] = np.nan
     right = np.roll(disparity, -2, axis=1)
-    inputs = as_free_inputs(disparity, right)
+    inputs = regressor_free_inputs(disparity, right)
     filled, consistency = fill_background(disparity), left_right_consistency(disparity, right)
     np.testing.assert_array_equal(inputs.disparity[0, 0], filled)
     np.testing.assert_array_equal(inputs.consistency[0, 0], consistency)
     features = disparity_features(*inputs)[0].numpy()
-    assert features.shape == (FREE_FEATURES, 12, 20)
+    assert features.shape == (REGRESSOR_FREE_CHANNELS, 12, 20)
     np.testing.assert_array_equal(features[0], filled)
     np.testing.assert_array_equal(features[1], np.isfinite(disparity))
     np.testing.assert_array_equal(features[2], (consistency >= 0) & (consistency <= 1))
@@ -79,7 +79,7 @@ def test_features_are_what_they_say() -> None:
 
 def test_nothing_known_is_still_finite() -> None:
     nothing = np.full((6, 8), np.nan, np.float32)
-    inputs = as_free_inputs(nothing, nothing)
+    inputs = regressor_free_inputs(nothing, nothing)
     assert torch.isfinite(inputs.features).all()
     assert not inputs.known.any()
 
@@ -90,7 +90,7 @@ def test_a_batch_is_matched_pair_by_pair() -> None:
     left, right = (torch.from_numpy(view).permute(0, 3, 1, 2).float() / 255 for view in views)
     matched = match_batch(left, right, MATCHER)
     for index, pair in enumerate(pairs):
-        alone = as_free_inputs(*match_both(pair.left, pair.right, MATCHER))
+        alone = regressor_free_inputs(*match_both(pair.left, pair.right, MATCHER))
         for got, expected in zip(matched, alone, strict=True):
             torch.testing.assert_close(got[index : index + 1], expected)
 
@@ -100,7 +100,7 @@ def test_they_learn_what_matching_gets_wrong(run: Path) -> None:
     """On a pair they have not seen, the confidence sorts out most of the wrong pixels."""
     pair = random_pair(np.random.default_rng(50), 64, 128)
     left, right = match_both(pair.left, pair.right, MATCHER)
-    answer = FreePredictor(run).predict(pair.left, pair.right, left, right)
+    answer = RegressorFreePredictor(run).predict(pair.left, pair.right, left, right)
     assert answer.confidence is not None
     np.testing.assert_array_equal(answer.disparity, fill_background(left))
     wrong = np.abs(answer.disparity - pair.disparity_left) > 1
@@ -118,7 +118,7 @@ def test_they_learn_slopes(run: Path) -> None:
     rng = np.random.default_rng(51)
     pair = render([random_layer(rng, 3.0, (0.0, 0.055))], 64, 128)
     left, right = match_both(pair.left, pair.right, MATCHER)
-    answer = FreePredictor(run).predict(pair.left, pair.right, left, right)
+    answer = RegressorFreePredictor(run).predict(pair.left, pair.right, left, right)
     assert answer.gradient is not None
     truth = np.diff(pair.disparity_left, axis=0)
     guesses = {
@@ -134,16 +134,16 @@ def test_they_learn_slopes(run: Path) -> None:
 def test_networks_are_optional_and_checked(run: Path, tmp_path: Path) -> None:
     pair = random_pair(np.random.default_rng(1), 33, 47)
     disparity = pair.disparity_left
-    answer = FreePredictor(run).predict(pair.left, pair.right, disparity, pair.disparity_right)
+    answer = RegressorFreePredictor(run).predict(pair.left, pair.right, disparity, pair.disparity_right)
     assert answer.confidence is not None
     assert answer.confidence.shape == (33, 47)
-    bare = FreePredictor(tmp_path).predict(pair.left, pair.right, disparity, pair.disparity_right)
+    bare = RegressorFreePredictor(tmp_path).predict(pair.left, pair.right, disparity, pair.disparity_right)
     assert bare.confidence is None
     assert bare.gradient is None
     with pytest.raises(TrainingError, match="no such run folder"):
-        FreePredictor(tmp_path / "nothing")
+        RegressorFreePredictor(tmp_path / "nothing")
     with pytest.raises(TrainingError, match="right disparity is 47x20"):
-        FreePredictor(run).predict(pair.left, pair.right, disparity, pair.disparity_right[:20])
+        RegressorFreePredictor(run).predict(pair.left, pair.right, disparity, pair.disparity_right[:20])
     (tmp_path / "confnet_free.safetensors").write_bytes((run / "gradnet_free.safetensors").read_bytes())
     (tmp_path / "confnet_free.json").write_bytes((run / "gradnet_free.json").read_bytes())
     with pytest.raises(TrainingError, match="describes a gradnet_free"):

@@ -20,6 +20,7 @@ from refine import MRFParameters
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.methods.ours import Ours
 from stereoforge.cli import main
+from tests.training.running import train_quietly
 from tests.training.synthetic import write_dataset
 from training.data.augmentation import NO_AUGMENTATION
 from training.errors import TrainingError
@@ -27,7 +28,6 @@ from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, He
 from training.networks.inference import HeadInputs, Regression
 from training.prediction.predictor import StereoPredictor
 from training.presets import JointPreset, Preset, RegressorPreset, find_preset
-from training.runs.train import train
 from training.runs.weights import read_summary
 from training.tasks import JointHeads, JointTask, StereoTask
 
@@ -182,7 +182,7 @@ def start(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run folder with three networks of a few steps."""
     folder = tmp_path_factory.mktemp("start")
     for task in ("regressor", "confnet", "gradnet"):
-        train(task, [(data, 1.0)], folder, quick(task), steps=3, progress=False)
+        train_quietly(task, [(data, 1.0)], folder, quick(task), steps=3)
     return folder
 
 
@@ -197,8 +197,8 @@ class _PowerCut(Exception):  # noqa: N818
 def test_resumed_equals_uninterrupted(data: Path, start: Path, tmp_path: Path) -> None:
     """The same weights of both heads, bit for bit; other than those they started from, the regressor unchanged."""
     whole, broken = tmp_path / "whole", tmp_path / "broken"
-    options = {"init": start, "steps": 8, "seed": 3, "progress": False}
-    train("joint", [(data, 1.0)], whole, quick("joint"), **options)  # type: ignore[arg-type]
+    options = {"init": start, "steps": 8, "seed": 3}
+    train_quietly("joint", [(data, 1.0)], whole, quick("joint"), **options)  # type: ignore[arg-type]
 
     def stop(self: pl.LightningModule, *_: object) -> None:
         if self.global_step == 5:
@@ -207,8 +207,8 @@ def test_resumed_equals_uninterrupted(data: Path, start: Path, tmp_path: Path) -
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(StereoTask, "on_train_batch_end", stop)
         with pytest.raises(_PowerCut):
-            train("joint", [(data, 1.0)], broken, quick("joint"), **options)  # type: ignore[arg-type]
-    train("joint", [(data, 1.0)], broken, quick("joint"), resume=True, **options)  # type: ignore[arg-type]
+            train_quietly("joint", [(data, 1.0)], broken, quick("joint"), **options)  # type: ignore[arg-type]
+    train_quietly("joint", [(data, 1.0)], broken, quick("joint"), resume=True, **options)  # type: ignore[arg-type]
 
     last = [
         torch.load(run / "logs/joint/last.ckpt", weights_only=True)["state_dict"] for run in (whole, broken)
@@ -230,7 +230,7 @@ def test_resumed_equals_uninterrupted(data: Path, start: Path, tmp_path: Path) -
     assert prediction.gradient is not None
     options |= {"resume": True, "refinement": Ours(MRFParameters(alpha=7.0))}
     with pytest.raises(TrainingError, match="another refinement"):
-        train("joint", [(data, 1.0)], whole, quick("joint"), **options)  # type: ignore[arg-type]
+        train_quietly("joint", [(data, 1.0)], whole, quick("joint"), **options)  # type: ignore[arg-type]
 
 
 def test_the_command_trains_through_validated_parameters_and_hands_them_on(
@@ -258,27 +258,20 @@ def test_the_command_trains_through_validated_parameters_and_hands_them_on(
 def test_wrong_requests_are_sentences(data: Path, start: Path, tmp_path: Path) -> None:
     source = [(data, 1.0)]
     with pytest.raises(TrainingError, match="not with a robust one"):
-        train(
+        train_quietly(
             "joint", source, tmp_path / "r", quick("joint"), init=start, refinement=Ours(gradient_scale=0.1)
         )
     with pytest.raises(TrainingError, match="another run folder"):
-        train("joint", source, start, quick("joint"), init=start, progress=False)
+        train_quietly("joint", source, start, quick("joint"), init=start)
     with pytest.raises(TrainingError, match="already holds a confnet"):
-        train(
-            "joint",
-            source,
-            shutil.copytree(start, tmp_path / "copy"),
-            quick("joint"),
-            init=start,
-            progress=False,
-        )
+        train_quietly("joint", source, shutil.copytree(start, tmp_path / "copy"), quick("joint"), init=start)
     with pytest.raises(TrainingError, match="name it as init"):
-        train("joint", source, tmp_path / "none", quick("joint"), progress=False)
+        train_quietly("joint", source, tmp_path / "none", quick("joint"))
     with pytest.raises(TrainingError, match="only joint trains through a refinement"):
-        train("confnet", source, tmp_path / "conf", quick("confnet"), init=start, refinement=Ours())
+        train_quietly("confnet", source, tmp_path / "conf", quick("confnet"), init=start, refinement=Ours())
     bare = tmp_path / "bare"
     bare.mkdir()
     for file in start.glob("regressor.*"):
         shutil.copy(file, bare)
     with pytest.raises(TrainingError, match="no trained confnet"):
-        train("joint", source, tmp_path / "out", quick("joint"), init=bare, progress=False)
+        train_quietly("joint", source, tmp_path / "out", quick("joint"), init=bare)

@@ -19,14 +19,14 @@ from training.networks.cost_features import RESIDUAL_CEILING_PX, limited_slopes
 
 Float32 = NDArray[np.float32]
 
-FREE_FEATURES = 6
+REGRESSOR_FREE_CHANNELS = 6
 """Channels of `disparity_features`."""
 CONFIRMED_WITHIN_PX = 1.0
 """A left-right difference up to this confirms a pixel."""
 RESIDUAL_WINDOW_PX = 9
 
 
-class FreeInputs(NamedTuple):
+class RegressorFreeInputs(NamedTuple):
     """What the networks see of a predictor's answer to a batch."""
 
     disparity: Tensor
@@ -43,7 +43,7 @@ class FreeInputs(NamedTuple):
 
 def disparity_features(disparity: Tensor, known: Tensor, consistency: Tensor) -> Tensor:
     """(B, 6, H, W): disparity, whether it is known, whether the right view confirms it, its forward differences, and
-    how far it is from its surroundings' mean; all but the first bounded. Arguments as in `FreeInputs`."""
+    how far it is from its surroundings' mean; all but the first bounded. Arguments as in `RegressorFreeInputs`."""
     confirmed = ((consistency >= 0) & (consistency <= CONFIRMED_WITHIN_PX)).to(disparity.dtype)
     reach = RESIDUAL_WINDOW_PX // 2
     mean = F.avg_pool2d(disparity, RESIDUAL_WINDOW_PX, 1, reach, count_include_pad=False)
@@ -51,7 +51,7 @@ def disparity_features(disparity: Tensor, known: Tensor, consistency: Tensor) ->
     return torch.cat([disparity, known, confirmed, limited_slopes(disparity), residual], dim=1)
 
 
-def as_free_inputs(disparity: Float32, disparity_right: Float32) -> FreeInputs:
+def regressor_free_inputs(disparity: Float32, disparity_right: Float32) -> RegressorFreeInputs:
     """The inputs of one pair, a batch of one, from both views' disparities (H, W) in pixels, NaN in holes.
 
     A map without any disparity is taken as infinitely far, unknown everywhere.
@@ -60,12 +60,12 @@ def as_free_inputs(disparity: Float32, disparity_right: Float32) -> FreeInputs:
     known = np.isfinite(disparity)
     filled = np.nan_to_num(fill_background(disparity.astype(np.float32)), nan=0.0)
     maps = (filled, known.astype(np.float32), consistency)
-    return FreeInputs(*(torch.from_numpy(np.ascontiguousarray(m))[None, None] for m in maps))
+    return RegressorFreeInputs(*(torch.from_numpy(np.ascontiguousarray(m))[None, None] for m in maps))
 
 
-def match_batch(left: Tensor, right: Tensor, parameters: SGBMParameters) -> FreeInputs:
+def match_batch(left: Tensor, right: Tensor, parameters: SGBMParameters) -> RegressorFreeInputs:
     """Semi-global matching of images (B, 3, H, W) in 0..1, as the networks see it."""
     views = [(v.clamp(0, 1) * 255).round().byte().permute(0, 2, 3, 1).cpu().numpy() for v in (left, right)]
     pairs = zip(*(np.ascontiguousarray(view) for view in views), strict=True)
-    answers = [as_free_inputs(*match_both(one, other, parameters)) for one, other in pairs]
-    return FreeInputs(*(torch.cat(maps).to(left.device) for maps in zip(*answers, strict=True)))
+    answers = [regressor_free_inputs(*match_both(one, other, parameters)) for one, other in pairs]
+    return RegressorFreeInputs(*(torch.cat(maps).to(left.device) for maps in zip(*answers, strict=True)))

@@ -14,7 +14,7 @@ from training.errors import TrainingError
 from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.networks.cost_features import Evidence
 from training.networks.inference import estimate
-from training.networks.regressor_free import FreeInputs, as_free_inputs
+from training.networks.regressor_free import RegressorFreeInputs, regressor_free_inputs
 from training.runs.weights import has_weights, load_confnet, load_gradnet, load_regressor, on_regressor
 
 
@@ -93,7 +93,7 @@ class StereoPredictor:
         return np.ascontiguousarray(mirrored[:, ::-1])
 
 
-class FreePredictor:
+class RegressorFreePredictor:
     """ConfNet and GradNet of a run folder for the disparity of any predictor (`confnet_free`, `gradnet_free`)."""
 
     def __init__(self, run: Path | str, device: str = "cpu") -> None:
@@ -137,7 +137,9 @@ class FreePredictor:
                     f"the {name} disparity is {maps.shape[1]}x{maps.shape[0]}, "
                     f"the image {left.shape[1]}x{left.shape[0]}"
                 )
-        inputs = FreeInputs(*(maps.to(self._device) for maps in as_free_inputs(disparity, disparity_right)))
+        inputs = RegressorFreeInputs(
+            *(maps.to(self._device) for maps in regressor_free_inputs(disparity, disparity_right))
+        )
         image, other = (_as_tensor(view, self._device) for view in (left, right))
         evidence = Evidence(image, other, inputs.disparity)
         confidence = gradient = None

@@ -4,16 +4,16 @@ from training.tasks.base import StereoTask
 from training.tasks.heads import ConfNetTask, GradNetTask
 from training.tasks.joint import JointHeads, JointTask
 from training.tasks.regressor import FineTuningTask, RegressorTask
-from training.tasks.regressor_free import FreeConfNetTask, FreeGradNetTask
+from training.tasks.regressor_free import RegressorFreeConfNetTask, RegressorFreeGradNetTask
 
 __all__ = [
     "ConfNetTask",
     "FineTuningTask",
-    "FreeConfNetTask",
-    "FreeGradNetTask",
     "GradNetTask",
     "JointHeads",
     "JointTask",
+    "RegressorFreeConfNetTask",
+    "RegressorFreeGradNetTask",
     "RegressorTask",
     "StereoTask",
 ]

@@ -9,14 +9,14 @@ from training.data.batch import StereoBatch
 from training.networks import ConfNet, GradNet
 from training.networks.cost_features import Evidence
 from training.networks.regressor_free import match_batch
-from training.presets import FreeConfNetPreset, FreeGradNetPreset
+from training.presets import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset
 from training.tasks.head_objectives import ConfidenceTask, GradientTask
 
 
-class FreeConfNetTask(ConfidenceTask):
+class RegressorFreeConfNetTask(ConfidenceTask):
     """`confnet_free`, of disparities that are matched as the run goes."""
 
-    def __init__(self, preset: FreeConfNetPreset, network: ConfNet, steps: int, seed: int) -> None:
+    def __init__(self, preset: RegressorFreeConfNetPreset, network: ConfNet, steps: int, seed: int) -> None:
         super().__init__(preset, steps, seed)
         self.network = network
         self.correct_within_px = preset.correct_within_px
@@ -35,12 +35,12 @@ class FreeConfNetTask(ConfidenceTask):
         return disparity, self.kept_network.confidence(*inputs)
 
 
-class FreeGradNetTask(GradientTask):
+class RegressorFreeGradNetTask(GradientTask):
     """`gradnet_free`, with disparities to do better than that are matched as the run goes."""
 
     initial = "matched"
 
-    def __init__(self, preset: FreeGradNetPreset, network: GradNet, steps: int, seed: int) -> None:
+    def __init__(self, preset: RegressorFreeGradNetPreset, network: GradNet, steps: int, seed: int) -> None:
         super().__init__(preset, steps, seed)
         self.network = network
         self.threshold_px = preset.gradient_threshold_px
