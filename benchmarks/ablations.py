@@ -23,12 +23,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from datagen.sources.registry import open_source
 from refine.evaluation.tuning import measure
+from refine.metrics import sparsification_curve
 from stereoforge.pipelines.prediction import open_predictors, open_settings
-from training.metrics import sparsification_auc
+from training.metrics import AUC_STEPS
 from training.presets import (
     SMALL_CONFNET,
     SMALL_GRADNET,
@@ -187,8 +187,11 @@ def judge(run: Path, source: Path, data: Path) -> dict[str, float]:
     refined = measure(open_settings(None, source).ours, frames)
 
     def area(threshold: float) -> float:
-        maps = ((frame.confidence, frame.disparity, frame.truth) for frame in frames)
-        return float(np.mean([sparsification_auc(*map(torch.from_numpy, each), threshold) for each in maps]))
+        curves = (
+            sparsification_curve(frame.disparity, frame.truth, frame.confidence, threshold, steps=AUC_STEPS)
+            for frame in frames
+        )
+        return float(np.nanmean([curve.auc for curve in curves]))
 
     return {
         "auc at 1 px": area(1.0),

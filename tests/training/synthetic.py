@@ -73,10 +73,10 @@ def render(layers: Sequence[Layer], height: int, width: int) -> StereoPair:
     images = np.zeros((2, height, width, 3))
     disparities = np.zeros((2, height, width), np.float32)
     for layer in layers:
-        for eye, x_left in enumerate((x, layer.left_of_right(x, y))):
+        for view, x_left in enumerate((x, layer.left_of_right(x, y))):
             seen = layer.contains(x_left, y)
-            images[eye][seen] = layer.color(x_left, y)[seen]
-            disparities[eye][seen] = layer.disparity_left(x_left, y)[seen]
+            images[view][seen] = layer.color(x_left, y)[seen]
+            disparities[view][seen] = layer.disparity_left(x_left, y)[seen]
     left, right = np.rint(images * 255).astype(np.uint8)
     return StereoPair(left, right, *disparities)
 
@@ -100,8 +100,8 @@ def write_dataset(
     width: int = 128,
     unknown_rows: int = 0,
 ) -> Path:
-    """A data set in the native layout, as much of it as training reads: one frame a scene. The left truth of training
-    scene n lacks its first n times `unknown_rows` rows."""
+    """A data set in the native layout, as much of it as training reads: one frame a scene. The left ground
+    truth of training scene n lacks its first n times `unknown_rows` rows."""
     layout = Layout(root)
     rng = np.random.default_rng(seed)
     for split, count in (("train", train), ("val", val)):
@@ -109,17 +109,18 @@ def write_dataset(
             pair = random_pair(rng, height, width)
             if split == "train":
                 pair.disparity_left[: scene * unknown_rows] = np.nan
-            _write_scene(layout, split, scene, pair)
+            write_scene(layout, split, scene, pair)
     layout.recipe.write_text("family: synthetic\n")
     return root
 
 
-def _write_scene(layout: Layout, split: str, scene: int, pair: StereoPair) -> None:
+def write_scene(layout: Layout, split: str, scene: int, pair: StereoPair) -> None:
+    """Write, or write anew, a scene of one frame."""
     entries = []
     views = {"left": (pair.left, pair.disparity_left), "right": (pair.right, pair.disparity_right)}
-    for eye, (image, disparity) in views.items():
-        picture = layout.file("frames_cleanpass", split, scene, eye, FIRST_FRAME)
-        truth = layout.file("disparity", split, scene, eye, FIRST_FRAME)
+    for view, (image, disparity) in views.items():
+        picture = layout.file("frames_cleanpass", split, scene, view, FIRST_FRAME)
+        truth = layout.file("disparity", split, scene, view, FIRST_FRAME)
         for path in (picture, truth):
             path.parent.mkdir(parents=True, exist_ok=True)
         write_png(picture, image)

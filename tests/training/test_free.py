@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import torch
 
+from refine.metrics import optimal_auc, sparsification_curve
 from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
 from tests.training.running import train_quietly
 from tests.training.synthetic import random_layer, random_pair, render, write_dataset
 from training.data.augmentation import NO_AUGMENTATION
 from training.errors import TrainingError
-from training.metrics import optimal_auc, sparsification_auc
 from training.networks.regressor_free import (
     REGRESSOR_FREE_CHANNELS,
     disparity_features,
@@ -105,10 +105,9 @@ def test_they_learn_what_matching_gets_wrong(run: Path) -> None:
     np.testing.assert_array_equal(answer.disparity, fill_background(left))
     wrong = np.abs(answer.disparity - pair.disparity_left) > 1
     assert 0.02 < wrong.mean() < 0.6
-    maps = (torch.from_numpy(m) for m in (answer.confidence, answer.disparity, pair.disparity_left))
     rate = float(wrong.mean())
-    best = float(optimal_auc(torch.tensor(rate)))
-    area = float(sparsification_auc(*maps))
+    best = optimal_auc(rate)
+    area = sparsification_curve(answer.disparity, pair.disparity_left, answer.confidence).auc
     assert area < best + 0.4 * (rate - best)
 
 

@@ -8,7 +8,6 @@ import torch
 
 from training.data.batch import StereoBatch
 from training.losses import STAGE_WEIGHTS
-from training.metrics import bad_rate, gradient_error, optimal_auc, sparsification_auc
 from training.networks import (
     ConfNet,
     DispNetConfig,
@@ -189,25 +188,3 @@ def test_warmup_and_cosine() -> None:
     assert factors[50] == pytest.approx(0.5)
     assert factors[99] == pytest.approx(0.5 * (1 + math.cos(math.pi * 0.99)))
     assert learning_rate_factor(config, 500, 1000, 100) == pytest.approx(0.5)
-
-
-def test_sparsification() -> None:
-    """Perfect confidence gives the optimal area, constant confidence the bad rate, reversed more than that."""
-    generator = torch.Generator().manual_seed(0)
-    truth = torch.zeros(1, 1, 100, 200)
-    disparity = 4 * torch.rand(truth.shape, generator=generator)
-    truth[..., :20] = torch.nan
-    rate = bad_rate(disparity, truth, 1.0)
-    assert rate.item() == pytest.approx(0.75, abs=0.01)
-    perfect = sparsification_auc(-disparity, disparity, truth)
-    assert perfect.item() == pytest.approx(optimal_auc(rate).item(), abs=2e-3)
-    assert optimal_auc(torch.tensor(0.2348)).item() == pytest.approx(0.0300, abs=1e-4)
-    constant = sparsification_auc(torch.zeros_like(truth), disparity, truth)
-    assert constant.item() == pytest.approx(rate.item(), abs=0.02)
-    assert sparsification_auc(disparity, disparity, truth) > constant
-
-
-def test_gradient_error_counts_smooth_pixels() -> None:
-    truth = torch.tensor([[[[0.0, 0.5, 3.0, torch.nan]], [[0.25, -0.5, 0.0, 0.0]]]])
-    gradient = torch.tensor([[[[0.1, 0.5, 0.0, 0.0]], [[0.0, 0.0, 0.0, 0.0]]]])
-    assert gradient_error(gradient, truth, 1.0).item() == pytest.approx((0.1 + 0.25 + 0.5) / 2)

@@ -74,8 +74,8 @@ class StereoTask(pl.LightningModule):
         """The loss of a batch of crops."""
 
     @abstractmethod
-    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-        """Figures of one whole frame, and the maps its panel shows."""
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        """Figures of one whole frame, NaN where nothing can be measured, and the maps that its panel shows."""
 
     @abstractmethod
     def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
@@ -128,11 +128,11 @@ class StereoTask(pl.LightningModule):
         figures, maps = self.validate_frame(batch)
         answered = not any(bool(torch.isnan(each).all()) for each in maps.values())
         for name, value in figures.items():
-            # A frame whose truth says nothing of a figure does not count; one for which the network has no number does.
-            unknown = answered and bool(torch.isnan(value))
+            # A frame whose ground truth says nothing of a figure does not count; a network without an answer does.
+            unknown = answered and math.isnan(value)
             self.log(
                 f"validation/{name}",
-                torch.zeros_like(value) if unknown else value,
+                0.0 if unknown else value,
                 batch_size=0 if unknown else 1,
                 on_step=False,
                 on_epoch=True,

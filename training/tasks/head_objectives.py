@@ -8,6 +8,7 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
+from refine.metrics import optimal_auc
 from stereoforge_kit.viewing import (
     Picture,
     confidence_picture,
@@ -17,7 +18,7 @@ from stereoforge_kit.viewing import (
 )
 from training.data.batch import StereoBatch
 from training.losses import confidence_cross_entropy, masked_gradient_l1
-from training.metrics import bad_rate, forward_differences, gradient_error, optimal_auc, sparsification_auc
+from training.metrics import bad_pixel_rate, forward_gradient, gradient_error, sparsification_auc
 from training.networks import ConfNet, GradNet
 from training.tasks.base import StereoTask, image_of, map_of
 
@@ -48,10 +49,10 @@ class ConfidenceTask(DisparityTask):
         )
 
     @torch.no_grad()
-    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
         disparity, confidence = self.predict(batch)
         truth, threshold = batch.disparity, self.correct_within_px
-        rate = bad_rate(disparity, truth, threshold)
+        rate = bad_pixel_rate(disparity, truth, threshold)
         figures = {
             "auc": sparsification_auc(confidence, disparity, truth, threshold),
             "auc_random": rate,
@@ -84,9 +85,9 @@ class GradientTask(DisparityTask):
         return masked_gradient_l1(self.network(*inputs), batch.gradient, self.threshold_px)
 
     @torch.no_grad()
-    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
         disparity, gradient = self.predict(batch)
-        own = forward_differences(disparity)
+        own = forward_gradient(disparity)
         figures = {
             "gradient": gradient_error(gradient, batch.gradient, self.threshold_px),
             f"gradient_{self.initial}": gradient_error(own, batch.gradient, self.threshold_px),

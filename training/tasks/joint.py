@@ -19,9 +19,9 @@ from stereoforge_kit.viewing import (
 from training.data.batch import StereoBatch
 from training.losses import confidence_cross_entropy, masked_gradient_l1, refinement_l1
 from training.metrics import (
-    bad_rate,
+    bad_pixel_rate,
     end_point_error,
-    forward_differences,
+    forward_gradient,
     gradient_error,
     sparsification_auc,
 )
@@ -105,7 +105,7 @@ class JointTask(HeadTask):
         )
         return own + self.losses.refined_weight * through
 
-    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
         heads = self.kept_network
         disparity, confidence, gradient = estimate(
             self.regressor, heads.confnet, heads.gradnet, batch.left, batch.right
@@ -123,8 +123,8 @@ class JointTask(HeadTask):
         truth, threshold = batch.disparity, self.losses.gradient_threshold_px
         figures = {
             "refined_epe": end_point_error(refined, truth),
-            "refined_bad1": bad_rate(refined, truth, 1.0),
-            "refined_gradient": gradient_error(forward_differences(refined), batch.gradient, threshold),
+            "refined_bad1": bad_pixel_rate(refined, truth, 1.0),
+            "refined_gradient": gradient_error(forward_gradient(refined), batch.gradient, threshold),
             "gradient": gradient_error(gradient, batch.gradient, threshold),
             "auc": sparsification_auc(confidence, disparity, truth, self.losses.correct_within_px),
         }

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from stereoforge_kit.viewing import Picture, disparity_picture, error_picture, side_by_side
 from training.data.batch import StereoBatch
 from training.losses import gradient_aware_l1, multiscale_l1, stage_weights
-from training.metrics import bad_rate, end_point_error, forward_differences, gradient_error
+from training.metrics import bad_pixel_rate, end_point_error, forward_gradient, gradient_error
 from training.networks import DispNetCorr1D, full_resolution
 from training.networks.inference import estimate
 from training.presets import FineTuningPreset, RegressorPreset
@@ -27,14 +27,14 @@ class _DisparityTask(StereoTask):
     def decayed_parameters(self) -> Iterable[nn.Parameter]:
         return self.network.contracting_weights()
 
-    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
         disparity = estimate(self.kept_network, None, None, batch.left, batch.right).disparity
         truth = batch.disparity
         figures = {
             "epe": end_point_error(disparity, truth),
-            "bad1": bad_rate(disparity, truth, 1.0),
-            "bad3": bad_rate(disparity, truth, 3.0),
-            "gradient": gradient_error(forward_differences(disparity), batch.gradient, SMOOTH_BELOW_PX),
+            "bad1": bad_pixel_rate(disparity, truth, 1.0),
+            "bad3": bad_pixel_rate(disparity, truth, 3.0),
+            "gradient": gradient_error(forward_gradient(disparity), batch.gradient, SMOOTH_BELOW_PX),
         }
         return figures, {"disparity": disparity}
 
