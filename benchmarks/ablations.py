@@ -122,7 +122,7 @@ def confnets() -> dict[str, Preset]:
     base = SMALL_CONFNET
     return {
         **heads(base, {"dropout 0.5": 0.5, "no dropout": 0.0}),
-        "no evidence": replace(base, network=replace(base.network, evidence=False)),
+        "no cost features": replace(base, network=replace(base.network, cost_features=False)),
         **{
             f"labels within {threshold:g} px": replace(base, correct_within_px=threshold)
             for threshold in (0.5, 2.0, 3.0)

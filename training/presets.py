@@ -249,7 +249,7 @@ SMALL_CONFNET = ConfNetPreset(
         dropout=0.2,
         normalization="batch",
         half_resolution=True,
-        evidence=True,
+        cost_features=True,
     ),
     validation_interval=500,
 )

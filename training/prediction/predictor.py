@@ -12,7 +12,7 @@ from torch import Tensor
 
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetCorr1D, GradNet
-from training.networks.cost_features import Evidence
+from training.networks.cost_features import CostFeatures
 from training.networks.inference import estimate
 from training.networks.regressor_free import RegressorFreeInputs, regressor_free_inputs
 from training.runs.weights import has_weights, load_confnet, load_gradnet, load_regressor, on_regressor
@@ -141,13 +141,13 @@ class RegressorFreePredictor:
             *(maps.to(self._device) for maps in regressor_free_inputs(disparity, disparity_right))
         )
         image, other = (_as_tensor(view, self._device) for view in (left, right))
-        evidence = Evidence(image, other, inputs.disparity)
+        cost_features = CostFeatures(image, other, inputs.disparity)
         confidence = gradient = None
         if self._confnet is not None:
-            seen = self._confnet.inputs(inputs.features, inputs.consistency, evidence)
+            seen = self._confnet.inputs(inputs.features, inputs.consistency, cost_features)
             confidence = _as_array(self._confnet.confidence(*seen))[..., 0]
         if self._gradnet is not None:
-            seen = self._gradnet.inputs(inputs.features, evidence)
+            seen = self._gradnet.inputs(inputs.features, cost_features)
             gradient = _as_array(self._gradnet(*seen))
         return Prediction(_as_array(inputs.disparity)[..., 0], confidence, gradient)
 

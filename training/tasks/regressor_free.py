@@ -7,7 +7,7 @@ from torch import Tensor
 
 from training.data.batch import StereoBatch
 from training.networks import ConfNet, GradNet
-from training.networks.cost_features import Evidence
+from training.networks.cost_features import CostFeatures
 from training.networks.regressor_free import match_batch
 from training.presets import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset
 from training.tasks.head_objectives import ConfidenceTask, GradientTask
@@ -26,8 +26,8 @@ class RegressorFreeConfNetTask(ConfidenceTask):
         with torch.no_grad():
             left, right = batch.left, batch.right
             matched = match_batch(left, right, self.matcher)
-            evidence = Evidence(left, right, matched.disparity)
-            inputs = self.network.inputs(matched.features, matched.consistency, evidence)
+            cost_features = CostFeatures(left, right, matched.disparity)
+            inputs = self.network.inputs(matched.features, matched.consistency, cost_features)
         return inputs, matched.disparity
 
     def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
@@ -50,7 +50,7 @@ class RegressorFreeGradNetTask(GradientTask):
         with torch.no_grad():
             left, right = batch.left, batch.right
             matched = match_batch(left, right, self.matcher)
-            inputs = self.network.inputs(matched.features, Evidence(left, right, matched.disparity))
+            inputs = self.network.inputs(matched.features, CostFeatures(left, right, matched.disparity))
         return inputs, matched.disparity
 
     def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
