@@ -69,8 +69,9 @@ def sparsification_auc(
         disparity, truth: As for `end_point_error`.
         threshold_px: Larger errors are bad.
     """
-    maps = (_as_map(each) for each in (disparity, truth, confidence))
-    return metrics.sparsification_curve(*maps, threshold_px, steps=AUC_STEPS).auc
+    return metrics.sparsification_curve(
+        _as_map(disparity), _as_map(truth), _as_map(confidence), threshold_px, steps=AUC_STEPS
+    ).auc
 
 
 def _as_map(maps: Tensor) -> NDArray[np.float32]:

@@ -14,9 +14,11 @@ class SamplingConfig:
     batch_size: int
     """Crops per step (and per process)."""
     crop_width: int
+    """Width of the crops in pixels, a multiple of 64."""
     crop_height: int
-    """Size of the crops in pixels, multiples of 64."""
+    """Height of the crops in pixels, a multiple of 64."""
     augmentation: AugmentationConfig = field(default_factory=AugmentationConfig)
+    """Random changes of the crops."""
     curriculum: float = 0.0
     """Share of the run over which the crops come from a growing first part of every data set, in its own order, so that
     a set that was rendered from simple to complex is seen that way; 0 draws from all frames from the beginning

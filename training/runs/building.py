@@ -53,6 +53,7 @@ class BuiltTask:
     """A task with its networks, ready to be trained."""
 
     task: StereoTask
+    """The Lightning module."""
     regressor_sha256: str | None
     """Digest of the regressor that heads are built on; None for the other tasks."""
 

@@ -7,6 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 PACKAGE = "stereoforge"
+"""The distribution whose version counts."""
 
 
 def code_revision() -> str:

@@ -74,11 +74,13 @@ class RunPlan:
     """A request that can be carried out, with everything looked up that needs no data set."""
 
     request: TrainingRequest
+    """What was asked for."""
     preset: Preset
     """The preset with the request's changes."""
     preset_name: str
     """The preset and its changes in words, for the model card."""
     steps: int
+    """Optimizer steps."""
     refinement: Ours | None
     """What `joint` trains through; None for the other tasks."""
     trainer_options: Mapping[str, Any]

@@ -14,8 +14,11 @@ from training.runs.hardware import process_rank
 from training.runs.weights import has_weights
 
 CHECKPOINT = "last.ckpt"
+"""Name of a run's only checkpoint, in `logs/<task>/`."""
 LOCK = ".lock"
+"""Name of the file that is locked while a run goes on."""
 SETTINGS = "settings.json"
+"""Name of the file with all that decides a run's weights."""
 LONGEST_SHOWN = 100
 """Characters of a setting that a message about it shows."""
 

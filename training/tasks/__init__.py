@@ -1,4 +1,4 @@
-"""The Lightning modules, one a task."""
+"""The Lightning modules that train the networks, one per task."""
 
 from training.tasks.base import StereoTask
 from training.tasks.heads import ConfNetTask, GradNetTask

@@ -1,4 +1,4 @@
-"""What ConfNet and GradNet learn, whatever the disparity comes from."""
+"""Head objectives: what ConfNet and GradNet are trained for, wherever the disparity comes from."""
 
 from __future__ import annotations
 
@@ -24,25 +24,28 @@ from training.tasks.base import StereoTask, image_of, map_of
 
 
 class DisparityTask(StereoTask):
-    """A network that learns something about a disparity it is given."""
+    """Training of a head that judges a given disparity."""
 
     @abstractmethod
     def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
-        """What the network sees of training crops, and the disparity it is about."""
+        """The network's inputs for a batch of crops, and the disparity (B, 1, H, W) px that it judges."""
 
     @abstractmethod
     def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
-        """The disparity, and what the kept network says of it, of a frame of any size."""
+        """The disparity of a frame of any size, (B, 1, H, W) px, and the kept network's output for it."""
 
 
 class ConfidenceTask(DisparityTask):
-    """Cross-entropy of "correct within t" (section 3.2 of the paper)."""
+    """ConfNet's objective: cross-entropy of "correct within t" (section 3.2 of the paper)."""
 
     monitor = "validation/auc"
     network: ConfNet
+    """The network that is trained."""
     correct_within_px: float
+    """t in pixels."""
 
     def loss(self, batch: StereoBatch) -> Tensor:
+        """`confidence_cross_entropy` of a batch."""
         inputs, disparity = self.head_inputs(batch)
         return confidence_cross_entropy(
             self.network(*inputs), disparity, batch.disparity, self.correct_within_px
@@ -50,6 +53,7 @@ class ConfidenceTask(DisparityTask):
 
     @torch.no_grad()
     def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        """The sparsification areas of the confidence, of a random order and of the optimal one."""
         disparity, confidence = self.predict(batch)
         truth, threshold = batch.disparity, self.correct_within_px
         rate = bad_pixel_rate(disparity, truth, threshold)
@@ -61,6 +65,7 @@ class ConfidenceTask(DisparityTask):
         return figures, {"disparity": disparity, "confidence": confidence}
 
     def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        """Image, disparity error and confidence."""
         error = map_of(maps["disparity"] - batch.disparity)
         return side_by_side(
             [
@@ -72,20 +77,24 @@ class ConfidenceTask(DisparityTask):
 
 
 class GradientTask(DisparityTask):
-    """Masked L1 on the disparity's forward differences (section 3.3 of the paper)."""
+    """GradNet's objective: masked L1 of the disparity's forward differences (section 3.3 of the paper)."""
 
     monitor = "validation/gradient"
     network: GradNet
+    """The network that is trained."""
     threshold_px: float
+    """Pixels with larger true differences are discontinuities and left out."""
     initial: ClassVar[str]
-    """What the disparity comes from, whose own gradients are the ones to do better than."""
+    """Where the disparity comes from; names the figure of its own gradients, which GradNet should beat."""
 
     def loss(self, batch: StereoBatch) -> Tensor:
+        """`masked_gradient_l1` of a batch."""
         inputs, _ = self.head_inputs(batch)
         return masked_gradient_l1(self.network(*inputs), batch.gradient, self.threshold_px)
 
     @torch.no_grad()
     def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        """The gradient errors of the network and of the disparity itself."""
         disparity, gradient = self.predict(batch)
         own = forward_gradient(disparity)
         figures = {
@@ -95,5 +104,6 @@ class GradientTask(DisparityTask):
         return figures, {"gradient": gradient, "own": own}
 
     def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        """Image, true gradient, the network's gradient and the disparity's own."""
         gradients = (batch.gradient, maps["gradient"], maps["own"])
         return side_by_side([image_of(batch.left), *(gradient_picture(map_of(g)) for g in gradients)])

@@ -1,4 +1,4 @@
-"""Training ConfNet and GradNet through the refinement, against the refined disparity (ours)."""
+"""Training ConfNet and GradNet through the refinement, on the error of the refined disparity (ours)."""
 
 from __future__ import annotations
 
@@ -33,23 +33,25 @@ from training.tasks.heads import HeadTask
 
 
 class JointHeads(nn.Module):
-    """ConfNet and GradNet as one network to be trained."""
+    """ConfNet and GradNet as one network."""
 
     def __init__(self, confnet: ConfNet, gradnet: GradNet) -> None:
+        """Keep both networks."""
         super().__init__()
         self.confnet = confnet
         self.gradnet = gradnet
 
 
 class JointTask(HeadTask):
-    """L1 of the refined disparity and of its gradient, and a share of what the heads learned from before.
+    """`joint`: the heads' own losses plus L1 of the refined disparity and of its gradient.
 
-    The regressor is frozen. The refinement is solved exactly, and the loss's slope comes back through it by the
-    implicit function theorem, so ConfNet learns where the disparity does harm and GradNet which slopes help.
+    The regressor is frozen. The refinement is solved to the preset's tolerance, and its derivative comes from the
+    implicit function theorem. So ConfNet learns where the disparity does harm, and GradNet which gradients help.
     """
 
     monitor = "validation/refined_epe"
     network: JointHeads
+    """The two networks that are trained."""
 
     def __init__(
         self,
@@ -60,21 +62,32 @@ class JointTask(HeadTask):
         steps: int,
         seed: int,
     ) -> None:
+        """As `HeadTask`, with the networks to train and the refinement to train them through."""
         super().__init__(preset, regressor, steps, seed)
         self.network = network
         self.refinement = refinement
         self.losses = preset
 
     def inputs(self, batch: StereoBatch) -> HeadInputs:
-        """What the two networks see, from the regressor run once."""
+        """The inputs of both networks for a batch of crops; the regressor runs once."""
         heads = self.network
         with torch.no_grad():
             return head_inputs(self.regressor, heads.confnet, heads.gradnet, batch.left, batch.right)
 
     def refine(self, image: Tensor, disparity: Tensor, logits: Tensor, gradient: Tensor) -> Tensor:
-        """The refined disparity (B, 1, H, W), differentiable in ConfNet's logits and GradNet's gradient."""
+        """Refine a disparity, differentiably in the networks' outputs.
+
+        Args:
+            image: (B, 3, H, W) in 0..1.
+            disparity: (B, 1, H, W) px.
+            logits: (B, 2, H, W), ConfNet's.
+            gradient: (B, 2, H, W) px per px, GradNet's.
+
+        Returns:
+            (B, 1, H, W) px.
+        """
         shape = self.refinement.shape
-        # `ConfidenceShape.apply` of softmax(logits)[1], without ever leaving the logarithms.
+        # `ConfidenceShape.apply` of softmax(logits)[1], computed in logarithms to keep its digits.
         log_confidence = F.logsigmoid((logits[:, 1] - logits[:, 0]) / shape.temperature)
         return refine_batch(
             disparity[:, 0],
@@ -87,6 +100,7 @@ class JointTask(HeadTask):
         )[:, None]
 
     def loss(self, batch: StereoBatch) -> Tensor:
+        """The heads' own losses plus the weighted `refinement_l1` of a batch."""
         seen = self.inputs(batch)
         disparity = seen.regression.disparity
         logits, gradient = self.network.confnet(*seen.confnet), self.network.gradnet(*seen.gradnet)
@@ -106,19 +120,16 @@ class JointTask(HeadTask):
         return own + self.losses.refined_weight * through
 
     def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        """Errors of the refined disparity, and the figures of both networks by themselves."""
         heads = self.kept_network
         disparity, confidence, gradient = estimate(
             self.regressor, heads.confnet, heads.gradnet, batch.left, batch.right
         )
         assert confidence is not None
         assert gradient is not None
-        image, initial, trust, slopes = (
-            image_of(batch.left),
-            map_of(disparity),
-            map_of(confidence),
-            map_of(gradient),
-        )
-        solved = self.refinement.solve(initial, trust, slopes, image).disparity
+        solved = self.refinement.solve(
+            map_of(disparity), map_of(confidence), map_of(gradient), image_of(batch.left)
+        ).disparity
         refined = torch.from_numpy(solved).to(disparity)[None, None]
         truth, threshold = batch.disparity, self.losses.gradient_threshold_px
         figures = {
@@ -131,6 +142,7 @@ class JointTask(HeadTask):
         return figures, {"refined": refined, "confidence": confidence, "gradient": gradient}
 
     def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        """Image, refined disparity and its error, confidence and gradient."""
         nearest = max(float(torch.nan_to_num(batch.disparity).max()), 1.0)
         return side_by_side(
             [
