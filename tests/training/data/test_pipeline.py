@@ -126,7 +126,7 @@ def test_shards_are_taken_a_few_at_a_time() -> None:
 
 
 def test_every_kind_of_source_is_trained_on(folders: tuple[Path, Path], tmp_path: Path) -> None:
-    """Mixed sets: ours, and a sparse one of another layout, without the right view's truth, held out in part."""
+    """Mixed sets: ours, and a sparse one of another layout, without the right view's ground truth, held out in part."""
     for index in range(4):
         name = f"{index:06d}_10.png"
         w = random_pair(np.random.default_rng(index), 80, 140)

@@ -39,7 +39,7 @@ def quick(task: str) -> RegressorFreeConfNetPreset | RegressorFreeGradNetPreset:
         validation_interval=150,
         augmentation=NO_AUGMENTATION,
         matcher=MATCHER,
-        # A reach of 30 pixels to every side would see more border than picture in so small a crop.
+        # A reach of 30 pixels in every direction would see more border than picture in so small a crop.
         network=replace(preset.network, width=16, hidden=16, dropout=0.0, dilations=(1, 2, 4, 4)),
     )
 
@@ -86,8 +86,8 @@ def test_nothing_known_is_still_finite() -> None:
 
 def test_a_batch_is_matched_pair_by_pair() -> None:
     pairs = [random_pair(np.random.default_rng(seed), 48, 96) for seed in (0, 1)]
-    views = [np.stack([getattr(pair, eye) for pair in pairs]) for eye in ("left", "right")]
-    left, right = (torch.from_numpy(view).permute(0, 3, 1, 2).float() / 255 for view in views)
+    images = [np.stack([getattr(pair, view) for pair in pairs]) for view in ("left", "right")]
+    left, right = (torch.from_numpy(image).permute(0, 3, 1, 2).float() / 255 for image in images)
     matched = match_batch(left, right, MATCHER)
     for index, pair in enumerate(pairs):
         alone = regressor_free_inputs(*match_both(pair.left, pair.right, MATCHER))
@@ -113,7 +113,7 @@ def test_they_learn_what_matching_gets_wrong(run: Path) -> None:
 
 @pytest.mark.slow
 def test_they_learn_slopes(run: Path) -> None:
-    """Nearer to the truth's slopes than matching's own, and than no slope at all."""
+    """Nearer to the true slopes than matching's own, and than no slope at all."""
     rng = np.random.default_rng(51)
     pair = render([random_layer(rng, 3.0, (0.0, 0.055))], 64, 128)
     left, right = match_both(pair.left, pair.right, MATCHER)

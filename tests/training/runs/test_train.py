@@ -299,7 +299,7 @@ def test_killed_before_the_first_checkpoint(data: Path, tmp_path: Path) -> None:
 
 
 def write_kitti(root: Path, count: int) -> None:
-    """Sparse truth in KITTI's layout."""
+    """Sparse ground truth in KITTI's layout."""
     for index in range(count):
         pair = random_pair(np.random.default_rng(index), 80, 140)
         name = f"{index:06d}_10.png"
