@@ -2,8 +2,8 @@
 
 Which pixels count is said there and nowhere else: ground truth that is NaN leaves a pixel out, an empty mask gives NaN,
 and an estimate that is NaN is bad in every rate and left out of every mean. The functions here only bring tensors into
-the shape that those take; all images of a batch are pooled. A validation leaves frames whose figure is NaN out of its
-mean.
+the shape that those take; all images of a batch are pooled. A validation leaves frames whose figure is NaN for want of
+ground truth out of its mean (`StereoTask.validation_step`).
 """
 
 from __future__ import annotations

@@ -109,13 +109,12 @@ def write_dataset(
             pair = random_pair(rng, height, width)
             if split == "train":
                 pair.disparity_left[: scene * unknown_rows] = np.nan
-            write_scene(layout, split, scene, pair)
+            _write_scene(layout, split, scene, pair)
     layout.recipe.write_text("family: synthetic\n")
     return root
 
 
-def write_scene(layout: Layout, split: str, scene: int, pair: StereoPair) -> None:
-    """Write, or write anew, a scene of one frame."""
+def _write_scene(layout: Layout, split: str, scene: int, pair: StereoPair) -> None:
     entries = []
     views = {"left": (pair.left, pair.disparity_left), "right": (pair.right, pair.disparity_right)}
     for view, (image, disparity) in views.items():

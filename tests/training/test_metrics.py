@@ -1,9 +1,6 @@
-"""Validation figures of tensors are those of `refine.metrics`, and frames that tell nothing are left out."""
+"""Validation figures of tensors are those of `refine.metrics`."""
 
 from __future__ import annotations
-
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +8,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from datagen.dataset.layout import Layout
 from refine import metrics
-from tests.training.running import train_quietly
-from tests.training.synthetic import random_pair, write_dataset, write_scene
 from training.metrics import (
     AUC_STEPS,
     bad_pixel_rate,
@@ -23,7 +17,6 @@ from training.metrics import (
     gradient_error,
     sparsification_auc,
 )
-from training.presets import RegressorPreset, find_preset
 
 
 @settings(max_examples=50, deadline=None)
@@ -70,30 +63,3 @@ def test_gradient_error_counts_smooth_pixels() -> None:
     truth = torch.tensor([[[[0.0, 0.5, 3.0, torch.nan]], [[0.25, -0.5, 0.0, torch.nan]]]])
     gradient = torch.tensor([[[[0.1, 0.5, 0.0, 0.0]], [[0.0, 0.0, 0.0, 0.0]]]])
     assert gradient_error(gradient, truth, 1.0) == pytest.approx((0.1 + 0.25 + 0.5) / 2)
-
-
-def test_a_frame_without_ground_truth_is_left_out_of_the_mean(tmp_path: Path) -> None:
-    """The figures are those of the frames that have ground truth, as if the other were not there."""
-    preset = find_preset("regressor", "tiny")
-    assert isinstance(preset, RegressorPreset)
-    preset = replace(
-        preset,
-        batch_size=2,
-        crop_width=128,
-        crop_height=64,
-        validation_interval=2,
-        network=replace(preset.network, width=0.0625),
-    )
-    sets = {
-        name: write_dataset(tmp_path / name, 0, train=2, val=frames)
-        for name, frames in {"one": 1, "two": 2}.items()
-    }
-    unknown = random_pair(np.random.default_rng(1), 64, 128)
-    unknown.disparity_left[:] = np.nan
-    write_scene(Layout(sets["two"]), "val", 1, unknown)
-    figures = [
-        train_quietly("regressor", [(data, 1.0)], tmp_path / f"run_{name}", preset, steps=2).validation
-        for name, data in sets.items()
-    ]
-    assert np.isfinite(list(figures[0].values())).all()
-    assert figures[1] == figures[0]

@@ -16,9 +16,9 @@ from training.tasks import StereoTask
 class BestWeights(pl.Callback):
     """Has the network saved whenever its validation figure is the best so far.
 
-    Until there is a finite figure, the latest weights are the best: without validation frames, or where they have no
-    truth for it, to the end. A figure that is not finite never beats one that is. The figure to beat is part of the
-    checkpoint, so a resumed run goes on comparing.
+    Until there is a finite figure, the latest weights are the best. So they are to the end if there are no validation
+    frames, or none with ground truth. A figure that is not finite never beats one that is. The best figure is part of
+    the checkpoint, so a resumed run continues to compare with it.
     """
 
     def __init__(self, save: Callable[[int, dict[str, float]], None]) -> None:
