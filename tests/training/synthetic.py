@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from datagen.dataset.layout import FIRST_FRAME, Layout
 from datagen.dataset.manifest import SceneManifest, file_entry, write_manifest
 from datagen.formats import write_pfm, write_png
-from training.data.augmentation import StereoPair
+from training.data.augmentation import AugmentationConfig, StereoPair
 
 WAVES = 12
+NO_AUGMENTATION = AugmentationConfig(0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Centre crops, unchanged."""
 
 
 @dataclass(frozen=True)

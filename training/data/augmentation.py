@@ -89,8 +89,6 @@ class AugmentationConfig:
     """Standard deviation of the small additional brightness, contrast, gamma and colour changes of the right view."""
 
 
-NO_AUGMENTATION = AugmentationConfig(0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-"""Centre crops, unchanged."""
 SHEARED = 0.25
 """Share of the pairs that `AugmentationConfig.shear` applies to."""
 WINDOW_TRIALS = 50

@@ -12,8 +12,7 @@ import torch
 from refine.metrics import optimal_auc, sparsification_curve
 from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
 from tests.training.running import train_quietly
-from tests.training.synthetic import random_layer, random_pair, render, write_dataset
-from training.data.augmentation import NO_AUGMENTATION
+from tests.training.synthetic import NO_AUGMENTATION, random_layer, random_pair, render, write_dataset
 from training.errors import TrainingError
 from training.networks.regressor_free import (
     REGRESSOR_FREE_CHANNELS,

@@ -18,8 +18,7 @@ from datagen import DatasetError, StereoDataset
 from stereoforge_kit.files import alone
 from tests.datagen.sources import published
 from tests.training.running import train_quietly
-from tests.training.synthetic import random_pair, write_dataset
-from training.data.augmentation import NO_AUGMENTATION
+from tests.training.synthetic import NO_AUGMENTATION, random_pair, write_dataset
 from training.data.pipeline import check_sizes
 from training.errors import TrainingError
 from training.networks import DispNetConfig

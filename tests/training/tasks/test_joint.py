@@ -21,8 +21,7 @@ from refine.energy.confidence_shape import ConfidenceShape
 from refine.methods.ours import Ours
 from stereoforge.cli import main
 from tests.training.running import train_quietly
-from tests.training.synthetic import write_dataset
-from training.data.augmentation import NO_AUGMENTATION
+from tests.training.synthetic import NO_AUGMENTATION, write_dataset
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
 from training.networks.inference import HeadInputs, Regression
