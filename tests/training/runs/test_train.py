@@ -380,7 +380,7 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
     with pytest.raises(TrainingError, match="crops must be multiples of 64 each way, not 100x64"):
         train_quietly("regressor", source, tmp_path, quick("regressor"), changes={"crop_width": 100})
     with pytest.raises(
-        TrainingError, match="correct_within_px does not apply here: a RegressorPreset has steps"
+        TrainingError, match="correct_within_px does not apply here: a RegressorPreset has batch_size"
     ):
         train_quietly("regressor", source, tmp_path, "tiny", changes={"correct_within_px": 3.0})
     with pytest.raises(TrainingError, match="16-bit floats need a GPU; bf16 works on CPUs too"):
