@@ -6,6 +6,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -19,20 +20,29 @@ from refine import MRFParameters
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.methods.ours import Ours
 from stereoforge.cli import main
-from tests.training.synthetic import write_dataset
-from training.data.augmentation import NO_AUGMENTATION
-from training.data.pipeline import Batch
+from tests.training.running import train_quietly
+from tests.training.synthetic import NO_AUGMENTATION, write_dataset
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
-from training.prediction.inference import HeadInputs, Regression
+from training.networks.inference import HeadInputs, Regression
 from training.prediction.predictor import StereoPredictor
 from training.presets import JointPreset, Preset, RegressorPreset, find_preset
-from training.runs.train import train
 from training.runs.weights import read_summary
 from training.tasks import JointHeads, JointTask, StereoTask
 
 HEIGHT, WIDTH = 32, 40
 HEAD = HeadConfig(feature_channels=4, width=8, hidden=8, dropout=0.0)
+
+
+class GivenBatch(NamedTuple):
+    """As much of a `StereoBatch` as the task reads, and what the regressor is taken to answer."""
+
+    left: Tensor
+    disparity: Tensor
+    gradient: Tensor
+    initial: Tensor
+    features: Tensor
+    consistency: Tensor
 
 
 class GivenTask(JointTask):
@@ -43,16 +53,13 @@ class GivenTask(JointTask):
         heads = JointHeads(ConfNet(HEAD), GradNet(HEAD))
         super().__init__(preset, DispNetCorr1D(DispNetConfig(width=0.0625)), heads, refinement, 1, 0)
 
-    def inputs(self, batch: Batch) -> HeadInputs:
-        seen = batch["left"], batch["features"]
-        return HeadInputs(
-            Regression(batch["initial"], batch["features"], batch["features"]),
-            (*seen, batch["consistency"]),
-            seen,
-        )
+    def inputs(self, batch: GivenBatch) -> HeadInputs:  # type: ignore[override]
+        seen = batch.left, batch.features
+        regression = Regression(batch.initial, batch.features, batch.features)
+        return HeadInputs(regression, (*seen, batch.consistency), seen)
 
 
-def given_batch(samples: int = 2) -> Batch:
+def given_batch(samples: int = 2) -> GivenBatch:
     """Planes with a wrong box each, which one of the features gives away; flat colours, so that slopes carry far."""
     rng = np.random.default_rng(0)
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
@@ -71,7 +78,9 @@ def given_batch(samples: int = 2) -> Batch:
         "features": features,
         "consistency": np.zeros_like(truth),
     }
-    return {name: torch.from_numpy(values.astype(np.float32)) for name, values in arrays.items()}
+    return GivenBatch(
+        **{name: torch.from_numpy(values.astype(np.float32)) for name, values in arrays.items()}
+    )
 
 
 def joint(**changes: object) -> JointPreset:
@@ -80,10 +89,10 @@ def joint(**changes: object) -> JointPreset:
     return replace(preset, **changes)  # type: ignore[arg-type]
 
 
-def refined(task: JointTask, batch: Batch) -> Tensor:
+def refined(task: JointTask, batch: GivenBatch) -> Tensor:
     (disparity, *_), confnet_sees, gradnet_sees = task.inputs(batch)
     logits, gradient = task.network.confnet(*confnet_sees), task.network.gradnet(*gradnet_sees)
-    return task.refine(batch["left"], disparity, logits, gradient)
+    return task.refine(batch.left, disparity, logits, gradient)
 
 
 @pytest.mark.parametrize("form", ["exact", "paper"])
@@ -91,20 +100,20 @@ def test_refines_as_the_method_does(form: str) -> None:
     """What is trained through is `Ours` with its parameters and its shape of the confidence."""
     ours = Ours(MRFParameters(30.0, 1.0, 4.0), ConfidenceShape(0.7, 2.0), form=form)  # type: ignore[arg-type]
     task, batch = GivenTask(joint(tolerance=1e-7), ours), given_batch(1)
-    batch["left"] = (batch["left"] * 255).round() / 255
+    batch = batch._replace(left=(batch.left * 255).round() / 255)
     (disparity, *_), confnet_sees, gradnet_sees = task.inputs(batch)
     with torch.no_grad():
         got = refined(task, batch)[0, 0]
         confidence = task.network.confnet.confidence(*confnet_sees)[0, 0].numpy()
         gradient = task.network.gradnet(*gradnet_sees)[0].permute(1, 2, 0).numpy()
-    image = (batch["left"][0] * 255).round().byte().permute(1, 2, 0).numpy()
+    image = (batch.left[0] * 255).round().byte().permute(1, 2, 0).numpy()
     expected = ours.solve(disparity[0, 0].numpy(), confidence, gradient, image).disparity
     np.testing.assert_allclose(got, expected, atol=2e-3)
 
 
 def test_slopes_reach_every_weight_of_both_heads_and_none_of_the_regressor() -> None:
     task, batch = GivenTask(joint(), Ours()), given_batch()
-    (refined(task, batch) - batch["disparity"]).abs().mean().backward()
+    (refined(task, batch) - batch.disparity).abs().mean().backward()
     for head in (task.network.confnet, task.network.gradnet):
         for name, parameter in head.named_parameters():
             assert parameter.grad is not None, name
@@ -117,19 +126,16 @@ def test_pixels_without_truth_neither_count_nor_poison() -> None:
     losses, slopes = [], []
     for missing in (False, True):
         if missing:
-            batch["disparity"] = batch["disparity"].clone()
-            batch["disparity"][1] = torch.nan
-            batch["gradient"][1] = torch.nan
-        else:
-            first = {name: tensor[:1] for name, tensor in batch.items()}
+            batch.disparity[1] = torch.nan
+            batch.gradient[1] = torch.nan
         task.network.zero_grad()
-        loss = task.loss(batch if missing else first)
+        loss = task.loss(batch if missing else GivenBatch(*(tensor[:1] for tensor in batch)))
         loss.backward()
         losses.append(loss.item())
         slopes.append(torch.cat([p.grad.flatten() for p in task.network.parameters() if p.grad is not None]))
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
     torch.testing.assert_close(*slopes, rtol=1e-2, atol=1e-3)
-    batch["disparity"][:], batch["gradient"][:] = torch.nan, torch.nan
+    batch.disparity[:], batch.gradient[:] = torch.nan, torch.nan
     task.network.zero_grad()
     task.loss(batch).backward()
     assert all(p.grad is not None and p.grad.isfinite().all() for p in task.network.parameters())
@@ -147,8 +153,7 @@ def test_overfits_two_samples() -> None:
         optimizer.step()
         losses.append(loss.item())
     error, before = (
-        (disparity - batch["disparity"]).abs().mean()
-        for disparity in (refined(task, batch), batch["initial"])
+        (disparity - batch.disparity).abs().mean() for disparity in (refined(task, batch), batch.initial)
     )
     assert error < 0.3 * before
     assert losses[-1] < 0.3 * losses[0]
@@ -176,7 +181,7 @@ def start(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run folder with three networks of a few steps."""
     folder = tmp_path_factory.mktemp("start")
     for task in ("regressor", "confnet", "gradnet"):
-        train(task, [(data, 1.0)], folder, quick(task), steps=3, progress=False)
+        train_quietly(task, [(data, 1.0)], folder, quick(task), steps=3)
     return folder
 
 
@@ -191,8 +196,8 @@ class _PowerCut(Exception):  # noqa: N818
 def test_resumed_equals_uninterrupted(data: Path, start: Path, tmp_path: Path) -> None:
     """The same weights of both heads, bit for bit; other than those they started from, the regressor unchanged."""
     whole, broken = tmp_path / "whole", tmp_path / "broken"
-    options = {"init": start, "steps": 8, "seed": 3, "progress": False}
-    train("joint", [(data, 1.0)], whole, quick("joint"), **options)  # type: ignore[arg-type]
+    options = {"init": start, "steps": 8, "seed": 3}
+    train_quietly("joint", [(data, 1.0)], whole, quick("joint"), **options)  # type: ignore[arg-type]
 
     def stop(self: pl.LightningModule, *_: object) -> None:
         if self.global_step == 5:
@@ -201,8 +206,8 @@ def test_resumed_equals_uninterrupted(data: Path, start: Path, tmp_path: Path) -
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(StereoTask, "on_train_batch_end", stop)
         with pytest.raises(_PowerCut):
-            train("joint", [(data, 1.0)], broken, quick("joint"), **options)  # type: ignore[arg-type]
-    train("joint", [(data, 1.0)], broken, quick("joint"), resume=True, **options)  # type: ignore[arg-type]
+            train_quietly("joint", [(data, 1.0)], broken, quick("joint"), **options)  # type: ignore[arg-type]
+    train_quietly("joint", [(data, 1.0)], broken, quick("joint"), resume=True, **options)  # type: ignore[arg-type]
 
     last = [
         torch.load(run / "logs/joint/last.ckpt", weights_only=True)["state_dict"] for run in (whole, broken)
@@ -224,7 +229,7 @@ def test_resumed_equals_uninterrupted(data: Path, start: Path, tmp_path: Path) -
     assert prediction.gradient is not None
     options |= {"resume": True, "refinement": Ours(MRFParameters(alpha=7.0))}
     with pytest.raises(TrainingError, match="another refinement"):
-        train("joint", [(data, 1.0)], whole, quick("joint"), **options)  # type: ignore[arg-type]
+        train_quietly("joint", [(data, 1.0)], whole, quick("joint"), **options)  # type: ignore[arg-type]
 
 
 def test_the_command_trains_through_validated_parameters_and_hands_them_on(
@@ -252,27 +257,20 @@ def test_the_command_trains_through_validated_parameters_and_hands_them_on(
 def test_wrong_requests_are_sentences(data: Path, start: Path, tmp_path: Path) -> None:
     source = [(data, 1.0)]
     with pytest.raises(TrainingError, match="not with a robust one"):
-        train(
+        train_quietly(
             "joint", source, tmp_path / "r", quick("joint"), init=start, refinement=Ours(gradient_scale=0.1)
         )
     with pytest.raises(TrainingError, match="another run folder"):
-        train("joint", source, start, quick("joint"), init=start, progress=False)
+        train_quietly("joint", source, start, quick("joint"), init=start)
     with pytest.raises(TrainingError, match="already holds a confnet"):
-        train(
-            "joint",
-            source,
-            shutil.copytree(start, tmp_path / "copy"),
-            quick("joint"),
-            init=start,
-            progress=False,
-        )
+        train_quietly("joint", source, shutil.copytree(start, tmp_path / "copy"), quick("joint"), init=start)
     with pytest.raises(TrainingError, match="name it as init"):
-        train("joint", source, tmp_path / "none", quick("joint"), progress=False)
+        train_quietly("joint", source, tmp_path / "none", quick("joint"))
     with pytest.raises(TrainingError, match="only joint trains through a refinement"):
-        train("confnet", source, tmp_path / "conf", quick("confnet"), init=start, refinement=Ours())
+        train_quietly("confnet", source, tmp_path / "conf", quick("confnet"), init=start, refinement=Ours())
     bare = tmp_path / "bare"
     bare.mkdir()
     for file in start.glob("regressor.*"):
         shutil.copy(file, bare)
     with pytest.raises(TrainingError, match="no trained confnet"):
-        train("joint", source, tmp_path / "out", quick("joint"), init=bare, progress=False)
+        train_quietly("joint", source, tmp_path / "out", quick("joint"), init=bare)

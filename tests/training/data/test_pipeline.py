@@ -42,7 +42,7 @@ def module_of(folders: tuple[Path, Path], seed: int = 0, **options: int) -> Ster
 
 
 def lefts(module: StereoDataModule, block: int = 0, rank: int = 0, processes: int = 1) -> torch.Tensor:
-    return torch.cat([batch["left"] for batch in module.block(block, rank, processes)])
+    return torch.cat([batch.left for batch in module.block(block, rank, processes)])
 
 
 def test_draws_do_not_depend_on_workers_or_cache(folders: tuple[Path, Path]) -> None:
@@ -55,12 +55,12 @@ def test_draws_do_not_depend_on_workers_or_cache(folders: tuple[Path, Path]) -> 
 def test_two_processes_share_the_draws_of_one_with_double_batch(folders: tuple[Path, Path]) -> None:
     module = module_of(folders)
     first, second = (list(module.block(0, rank, 2)) for rank in range(2))
-    together = [torch.cat([a["left"], b["left"]]) for a, b in zip(first, second, strict=True)]
+    together = [torch.cat([a.left, b.left]) for a, b in zip(first, second, strict=True)]
     sources, validation = open_sources([(folders[0], 2.0), (folders[1], 1.0)], (64, 64))
     double = Preset(**{**vars(PRESET), "batch_size": 4})
     alone = StereoDataModule(sources, validation, double, PRESET.steps, 0)
     for pair, batch in zip(together, alone.block(0), strict=True):
-        torch.testing.assert_close(pair, batch["left"], rtol=0, atol=0)
+        torch.testing.assert_close(pair, batch.left, rtol=0, atol=0)
 
 
 def test_blocks_divide_the_run(folders: tuple[Path, Path]) -> None:
@@ -112,7 +112,7 @@ def test_a_preset_with_a_curriculum_begins_with_the_first_frames(tmp_path: Path)
     schedule = schedule_draws(sources, 200, 0, 1.0)
     assert set(schedule[:10, 1]) == {0}
     without = StereoDataModule(sources, [], replace(preset, curriculum=0.0), 100, 0).block(0)
-    assert not torch.equal(next(iter(first))["disparity"], next(iter(without))["disparity"])
+    assert not torch.equal(next(iter(first)).disparity, next(iter(without)).disparity)
 
 
 def test_shards_are_taken_a_few_at_a_time() -> None:
@@ -126,7 +126,7 @@ def test_shards_are_taken_a_few_at_a_time() -> None:
 
 
 def test_every_kind_of_source_is_trained_on(folders: tuple[Path, Path], tmp_path: Path) -> None:
-    """Mixed sets: ours, and a sparse one of another layout, without the right view's truth, held out in part."""
+    """Mixed sets: ours, and a sparse one of another layout, without the right view's ground truth, held out in part."""
     for index in range(4):
         name = f"{index:06d}_10.png"
         w = random_pair(np.random.default_rng(index), 80, 140)
@@ -141,7 +141,7 @@ def test_every_kind_of_source_is_trained_on(folders: tuple[Path, Path], tmp_path
     assert [len(source.frames) for source in sources] == [2, 2]
     preset = replace(PRESET, augmentation=AugmentationConfig(horizontal_flip=1.0))
     batches = list(StereoDataModule(sources, held_out, preset, 5, 0).block(0))
-    holes = torch.stack([torch.isnan(batch["disparity"]).float().mean((1, 2, 3)) for batch in batches])
+    holes = torch.stack([torch.isnan(batch.disparity).float().mean((1, 2, 3)) for batch in batches])
     assert {share > 0.3 for share in holes.flatten().tolist()} == {True, False}
 
 
@@ -170,8 +170,8 @@ def test_cache_is_bounded(folders: tuple[Path, Path]) -> None:
 def test_validation_frames_are_whole(folders: tuple[Path, Path]) -> None:
     batches = list(module_of(folders).val_dataloader())
     assert len(batches) == 2
-    assert batches[0]["left"].shape == (1, 3, 64, 128)
-    assert torch.isnan(batches[0]["gradient"][:, :, -1]).all()
+    assert batches[0].left.shape == (1, 3, 64, 128)
+    assert torch.isnan(batches[0].gradient[:, :, -1]).all()
 
 
 def test_wrong_requests_are_sentences(folders: tuple[Path, Path], tmp_path: Path) -> None:

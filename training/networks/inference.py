@@ -1,4 +1,7 @@
-"""What the networks say about a pair of any size. Used by validation and by `StereoPredictor` alike."""
+"""The networks run together: disparity, confidence and gradient of pairs of any size.
+
+Training, validation and `training.prediction.predictor.StereoPredictor` all go through here.
+"""
 
 from __future__ import annotations
 
@@ -16,39 +19,41 @@ from training.networks import (
     full_resolution,
     left_right_consistency,
 )
-from training.networks.cost_features import Evidence
+from training.networks.cost_features import CostFeatures
 from training.networks.regressors.dispnet import STRIDE
 
 
 class Regression(NamedTuple):
-    """A regressor's answer to a batch."""
+    """A regressor's output for a batch, at full resolution."""
 
     disparity: Tensor
     """(B, 1, H, W) px of the input, not negative."""
     features: Tensor
     """(B, F, H/2, W/2) matching features."""
     decoded: Tensor
-    """(B, F, H/2, W/2) what the disparity was made of."""
+    """(B, F, H/2, W/2) decoded features (`DispNetOutput.decoded`)."""
 
     def features_for(self, config: HeadConfig) -> Tensor:
-        """The features that a head was trained on."""
+        """The features that a head of this config takes."""
         return self.features if config.features == "joined" else self.decoded
 
 
 class HeadInputs(NamedTuple):
-    """What ConfNet and GradNet see of a batch; empty where there is no such network."""
+    """Inputs of ConfNet and GradNet for a batch; empty for a network that there is not."""
 
     regression: Regression
-    """What they are about."""
+    """The disparity that the networks judge, and its features."""
     confnet: tuple[Tensor, ...]
+    """What `ConfNet.forward` takes."""
     gradnet: tuple[Tensor, ...]
+    """What `GradNet.forward` takes."""
 
 
 class Estimate(NamedTuple):
-    """The networks' answer to a batch; None where there is no such network."""
+    """The networks' outputs for a batch; None for a network that there is not."""
 
     disparity: Tensor
-    """(B, 1, H, W) px of the input."""
+    """(B, 1, H, W) px of the input, not negative."""
     confidence: Tensor | None
     """(B, 1, H, W) in 0..1."""
     gradient: Tensor | None
@@ -56,16 +61,28 @@ class Estimate(NamedTuple):
 
 
 def regress(regressor: DispNetCorr1D, left: Tensor, right: Tensor) -> Regression:
-    """Disparity and features of images (B, 3, H, W) whose sides are multiples of 64."""
+    """Predict the left view's disparity.
+
+    Args:
+        regressor: The network.
+        left, right: (B, 3, H, W) in 0..1, H and W multiples of 64.
+
+    Examples:
+        >>> from training.networks import DispNetConfig
+        >>> regressor = DispNetCorr1D(DispNetConfig(width=0.0625)).eval()
+        >>> regress(regressor, *torch.rand(2, 1, 3, 64, 64)).disparity.shape
+        torch.Size([1, 1, 64, 64])
+    """
     output = regressor(left, right)
     disparity = F.relu(full_resolution(output.disparities[-1], left.shape[-2:]))
     return Regression(disparity, output.features, output.decoded)
 
 
 def regress_consistently(regressor: DispNetCorr1D, left: Tensor, right: Tensor) -> tuple[Regression, Tensor]:
-    """Disparity and features of the left view, and the left-right-consistency map (B, 1, H, W), in one pass.
+    """Predict the left view's disparity and the left-right-consistency map (B, 1, H, W) in one forward pass.
 
-    The right view's disparity is that of the mirrored, swapped pair (`predict_right`), here in the same batch.
+    The right view's disparity is that of the swapped views, mirrored (`predict_right`), in the same batch. Arguments as
+    for `regress`.
     """
     batch = left.shape[0]
     both = regress(regressor, torch.cat([left, right.flip(-1)]), torch.cat([right, left.flip(-1)]))
@@ -77,23 +94,34 @@ def regress_consistently(regressor: DispNetCorr1D, left: Tensor, right: Tensor) 
 def head_inputs(
     regressor: DispNetCorr1D, confnet: ConfNet | None, gradnet: GradNet | None, left: Tensor, right: Tensor
 ) -> HeadInputs:
-    """What the heads that there are take of images whose sides are multiples of 64; the regressor runs once."""
+    """Run the regressor once and collect the inputs of the heads that there are.
+
+    Args:
+        regressor: The network that predicts the disparity.
+        confnet, gradnet: None for a head that is not there.
+        left, right: (B, 3, H, W) in 0..1, H and W multiples of 64.
+    """
     for_confnet: tuple[Tensor, ...] = ()
     if confnet is None:
         regression = regress(regressor, left, right)
-        evidence = Evidence(left, right, regression.disparity)
+        cost_features = CostFeatures(left, right, regression.disparity)
     else:
         regression, consistency = regress_consistently(regressor, left, right)
-        evidence = Evidence(left, right, regression.disparity)
-        for_confnet = confnet.inputs(regression.features_for(confnet.config), consistency, evidence)
+        cost_features = CostFeatures(left, right, regression.disparity)
+        for_confnet = confnet.inputs(regression.features_for(confnet.config), consistency, cost_features)
     for_gradnet: tuple[Tensor, ...] = ()
     if gradnet is not None:
-        for_gradnet = gradnet.inputs(regression.features_for(gradnet.config), evidence)
+        for_gradnet = gradnet.inputs(regression.features_for(gradnet.config), cost_features)
     return HeadInputs(regression, for_confnet, for_gradnet)
 
 
 def network_size(height: int, width: int) -> tuple[int, int]:
-    """The next multiples of 64, which the original network resizes its input to."""
+    """The size that an image is resized to, as the original network does: the next multiples of 64, (height, width).
+
+    Examples:
+        >>> network_size(375, 1242)
+        (384, 1280)
+    """
     return -(-height // STRIDE) * STRIDE, -(-width // STRIDE) * STRIDE
 
 
@@ -101,13 +129,22 @@ def network_size(height: int, width: int) -> tuple[int, int]:
 def estimate(
     regressor: DispNetCorr1D, confnet: ConfNet | None, gradnet: GradNet | None, left: Tensor, right: Tensor
 ) -> Estimate:
-    """Resize to multiples of 64 (no padding), predict, resize back.
+    """Predict disparity, confidence and gradient of images of any size.
 
-    With the input stretched by (sx, sy), a disparity comes out sx times too large, the horizontal gradient
-    unchanged (disparity and pixel stretch alike), the vertical one sx / sy times too large.
+    The images are resized to multiples of 64, not padded, and the outputs are resized back. With the input stretched by
+    (sx, sy), a disparity comes out sx times too large. The horizontal gradient comes out unchanged, since disparity and
+    pixels are stretched alike; the vertical one comes out sx / sy times too large. All are corrected here.
 
     Args:
+        regressor, confnet, gradnet: The networks, in evaluation mode; None for a head that is not there.
         left, right: (B, 3, H, W) in 0..1.
+
+    Examples:
+        >>> from training.networks import DispNetConfig
+        >>> regressor = DispNetCorr1D(DispNetConfig(width=0.0625)).eval()
+        >>> found = estimate(regressor, None, None, *torch.rand(2, 1, 3, 50, 70))
+        >>> found.disparity.shape, found.confidence
+        (torch.Size([1, 1, 50, 70]), None)
     """
     height, width = left.shape[-2:]
     inner_height, inner_width = network_size(height, width)
@@ -125,7 +162,10 @@ def estimate(
 
 
 def resize(maps: Tensor, height: int, width: int) -> Tensor:
-    """Bilinear, with the filter widened when shrinking; the same maps when the size is right already."""
+    """Resize maps (B, C, h, w) bilinearly to (B, C, height, width), antialiased when shrinking.
+
+    Returns the maps themselves if they have that size already.
+    """
     if maps.shape[-2:] == (height, width):
         return maps
     return F.interpolate(maps, size=(height, width), mode="bilinear", align_corners=False, antialias=True)

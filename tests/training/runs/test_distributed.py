@@ -9,9 +9,9 @@ import pytest
 import safetensors.torch
 import torch
 
+from tests.training.runs.test_train import scalars
 from tests.training.short_run import run
 from tests.training.synthetic import write_dataset
-from tests.training.test_train import scalars
 from training.runs.weights import read_summary
 
 STEPS = 20
@@ -26,7 +26,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_two_processes_make_the_run_of_one_with_double_batch(data: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
-    program = Path(__file__).with_name("short_run.py")
+    program = Path(__file__).parents[1] / "short_run.py"
     done = subprocess.run(
         [*command, program, data, tmp_path / "two", "2", str(STEPS)],
         env={"PYTHONPATH": str(program.parents[2]), "PATH": "/usr/bin:/bin", "OMP_NUM_THREADS": "1"},

@@ -17,15 +17,14 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from datagen import DatasetError, StereoDataset
 from stereoforge_kit.files import alone
 from tests.datagen.sources import published
-from tests.training.synthetic import random_pair, write_dataset
-from training.data.augmentation import NO_AUGMENTATION
+from tests.training.running import train_quietly
+from tests.training.synthetic import NO_AUGMENTATION, random_pair, write_dataset
 from training.data.pipeline import check_sizes
 from training.errors import TrainingError
 from training.networks import DispNetConfig
 from training.prediction.predictor import StereoPredictor
 from training.presets import Preset, RegressorPreset, find_preset
 from training.runs.hardware import Precision
-from training.runs.train import train
 from training.runs.weights import read_summary
 from training.tasks import GradNetTask, StereoTask
 
@@ -51,7 +50,7 @@ def quick_regressor(**changes: object) -> RegressorPreset:
 def run(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run folder with a regressor of a few steps."""
     folder = tmp_path_factory.mktemp("run")
-    train("regressor", [(data, 1.0)], folder, quick_regressor(), steps=6, progress=False)
+    train_quietly("regressor", [(data, 1.0)], folder, quick_regressor(), steps=6)
     return folder
 
 
@@ -87,7 +86,7 @@ def test_statistics_are_measured_once_and_then_fixed(
     monkeypatch.setattr(StereoTask, "on_train_start", begin)
     monkeypatch.setattr(StereoTask, "on_train_batch_end", end)
     preset = replace(quick_regressor(), fixed_statistics=0.5)
-    train("regressor", [(data, 1.0)], tmp_path, preset, steps=8, progress=False)
+    train_quietly("regressor", [(data, 1.0)], tmp_path, preset, steps=8)
     assert len(seen) == 8  # four steps, then the four batches that are measured over
     measured = seen[4:]
     expected = [torch.stack(part).mean(0) for part in zip(*measured, strict=True)]
@@ -109,7 +108,7 @@ def test_overfits_four_samples(data: Path, tmp_path: Path) -> None:
     )
     final = {}
     for task, steps in {"regressor": 900, "confnet": 150, "gradnet": 150}.items():
-        train(task, [(data, 1.0)], tmp_path, presets[task], steps=steps, progress=False)
+        train_quietly(task, [(data, 1.0)], tmp_path, presets[task], steps=steps)
         losses = scalars(tmp_path, task, "train/loss")
         final[task] = losses[max(losses)]
     # A weighted sum over six scales whose weights add up to 2: under 1.1 px on average.
@@ -128,13 +127,13 @@ def test_resumed_equals_uninterrupted(task: str, data: Path, run: Path, tmp_path
         if task != "regressor":
             for file in run.glob("regressor.*"):
                 shutil.copy(file, folder)
-    train(task, [(data, 1.0)], whole, preset, steps=11, seed=3, progress=False)
+    train_quietly(task, [(data, 1.0)], whole, preset, steps=11, seed=3)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(StereoTask, "on_train_batch_end", _stop_after(6, _PowerCut))
         with pytest.raises(_PowerCut):
-            train(task, [(data, 1.0)], broken, preset, steps=11, seed=3, progress=False)
-    train(task, [(data, 1.0)], broken, preset, steps=11, seed=3, resume=True, progress=False)
+            train_quietly(task, [(data, 1.0)], broken, preset, steps=11, seed=3)
+    train_quietly(task, [(data, 1.0)], broken, preset, steps=11, seed=3, resume=True)
 
     expected, got = weights(whole, task), weights(broken, task)
     assert expected.keys() == got.keys()
@@ -167,7 +166,7 @@ def test_an_interruption_comes_out_as_one_and_the_next_is_heard_too(
     monkeypatch.setattr(StereoTask, "on_train_batch_end", _stop_after(6, KeyboardInterrupt))
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     with pytest.raises(KeyboardInterrupt):
-        train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=11, progress=False)
+        train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=11)
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
     assert read_summary(tmp_path, "regressor").best_step == 4  # whole: the last validation's
 
@@ -175,9 +174,7 @@ def test_an_interruption_comes_out_as_one_and_the_next_is_heard_too(
 def test_resuming_a_finished_run_changes_nothing(data: Path, run: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(run, tmp_path / "run")
     before = (folder / "regressor.safetensors").read_bytes()
-    summary = train(
-        "regressor", [(data, 1.0)], folder, quick_regressor(), steps=6, resume=True, progress=False
-    )
+    summary = train_quietly("regressor", [(data, 1.0)], folder, quick_regressor(), steps=6, resume=True)
     assert (folder / "regressor.safetensors").read_bytes() == before
     assert summary.best_step in (4, 6)
     assert set(summary.validation) == {"epe", "bad1", "bad3", "gradient"}
@@ -186,10 +183,15 @@ def test_resuming_a_finished_run_changes_nothing(data: Path, run: Path, tmp_path
 def test_seed_and_workers(data: Path, tmp_path: Path) -> None:
     """The same seed gives the same weights whatever the workers; another seed gives others."""
     for name, seed, workers in (("a", 0, 0), ("b", 0, 1), ("c", 1, 0)):
-        train(
-            "regressor", [(data, 1.0)], tmp_path / name, quick_regressor(), steps=3, seed=seed, workers=workers,
-            progress=False,
-        )  # fmt: skip
+        train_quietly(
+            "regressor",
+            [(data, 1.0)],
+            tmp_path / name,
+            quick_regressor(),
+            steps=3,
+            seed=seed,
+            workers=workers,
+        )
     first, second, third = (weights(tmp_path / name, "regressor")["pr6.weight"] for name in "abc")
     assert torch.equal(first, second)
     assert not torch.equal(first, third)
@@ -199,13 +201,13 @@ def test_the_callers_random_state_is_left_alone(data: Path, tmp_path: Path) -> N
     torch.manual_seed(42)
     expected = torch.rand(3)
     torch.manual_seed(42)
-    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=1, progress=False)
+    train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=1)
     assert torch.equal(torch.rand(3), expected)
 
 
 def test_heads_see_the_regressor_unchanged(data: Path, run: Path, tmp_path: Path) -> None:
     """Built on another run's regressor, which is copied, frozen, BatchNorm statistics included."""
-    train("confnet", [(data, 1.0)], tmp_path, quick("confnet"), init=run, steps=3, progress=False)
+    train_quietly("confnet", [(data, 1.0)], tmp_path, quick("confnet"), init=run, steps=3)
     before, after = weights(run, "regressor"), weights(tmp_path, "regressor")
     assert all(torch.equal(before[name], after[name]) for name in before)
     inner = torch.load(tmp_path / "logs" / "confnet" / "last.ckpt", weights_only=True)["state_dict"]
@@ -246,10 +248,9 @@ def test_a_moving_average_is_what_is_kept(data: Path, tmp_path: Path) -> None:
             update(self, *arguments)  # type: ignore[arg-type]
 
         patch.setattr(StereoTask, "on_train_batch_end", on_train_batch_end)
-        train(
-            "regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=4, changes={"ema_decay": 0.5},
-            progress=False,
-        )  # fmt: skip
+        train_quietly(
+            "regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=4, changes={"ema_decay": 0.5}
+        )
     average = steps[0]
     for weight in steps[1:]:
         average = 0.5 * average + 0.5 * weight
@@ -267,7 +268,7 @@ def test_mixed_precision_is_nearly_the_same_run(data: Path, tmp_path: Path) -> N
     preset = replace(preset, optimizer=replace(preset.optimizer, learning_rate=1e-9))
     names: tuple[Precision, ...] = ("32", "bf16")
     for name in names:
-        train("regressor", [(data, 1.0)], tmp_path / name, preset, steps=10, precision=name, progress=False)
+        train_quietly("regressor", [(data, 1.0)], tmp_path / name, preset, steps=10, precision=name)
     losses = [scalars(tmp_path / name, "regressor", "train/loss")[9] for name in names]
     assert losses[0] == pytest.approx(losses[1], rel=0.01)
     assert losses[0] != losses[1]
@@ -278,26 +279,26 @@ def test_mixed_precision_is_nearly_the_same_run(data: Path, tmp_path: Path) -> N
 def test_a_run_is_resumed_whatever_its_data_set_is_called(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=5, progress=False)
+    train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=5)
     monkeypatch.chdir(data.parent)
     (tmp_path / "regressor.safetensors").unlink()
     again = [(data.name, 1.0)]
-    train("regressor", again, tmp_path, quick_regressor(), steps=5, resume=True, progress=False)
+    train_quietly("regressor", again, tmp_path, quick_regressor(), steps=5, resume=True)
     with pytest.raises(TrainingError, match=r"with another data \(.*1.0.*, not .*2.0.*\), so it cannot"):
-        train("regressor", [(data, 2.0)], tmp_path, quick_regressor(), steps=5, resume=True, progress=False)
+        train_quietly("regressor", [(data, 2.0)], tmp_path, quick_regressor(), steps=5, resume=True)
 
 
 def test_killed_before_the_first_checkpoint(data: Path, tmp_path: Path) -> None:
     """Weights without a checkpoint: --resume starts the same run anew instead of refusing it."""
-    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, progress=False)
+    train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2)
     before = weights(tmp_path, "regressor")
     (tmp_path / "logs" / "regressor" / "last.ckpt").unlink()
-    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, resume=True, progress=False)
+    train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, resume=True)
     assert all(torch.equal(before[name], tensor) for name, tensor in weights(tmp_path, "regressor").items())
 
 
 def write_kitti(root: Path, count: int) -> None:
-    """Sparse truth in KITTI's layout."""
+    """Sparse ground truth in KITTI's layout."""
     for index in range(count):
         pair = random_pair(np.random.default_rng(index), 80, 140)
         name = f"{index:06d}_10.png"
@@ -312,10 +313,16 @@ def test_recipes_for_sparse_real_data(run: Path, tmp_path: Path) -> None:
     """The paper's: ConfNet on the first pairs with t = 3, GradNet on dense disparities of another method."""
     write_kitti(tmp_path / "kitti", 4)
     data, held_out = [(f"kitti2015:{tmp_path / 'kitti'}#0-1", 1.0)], [f"{tmp_path / 'kitti'}#2-3"]
-    train(
-        "confnet", data, tmp_path / "run", quick("confnet"), init=run, validation=held_out, steps=4,
-        changes={"correct_within_px": 3.0}, progress=False,
-    )  # fmt: skip
+    train_quietly(
+        "confnet",
+        data,
+        tmp_path / "run",
+        quick("confnet"),
+        init=run,
+        validation=held_out,
+        steps=4,
+        changes={"correct_within_px": 3.0},
+    )
     assert set(read_summary(tmp_path / "run", "confnet").validation) == {"auc", "auc_random", "auc_optimal"}
 
     for index in range(2):
@@ -328,26 +335,31 @@ def test_recipes_for_sparse_real_data(run: Path, tmp_path: Path) -> None:
             GradNetTask,
             "loss",
             lambda self, batch: (
-                seen.append(torch.isnan(batch["disparity"]).float().mean().item()) or loss(self, batch)
+                seen.append(torch.isnan(batch.disparity).float().mean().item()) or loss(self, batch)
             ),
         )
-        train(
-            "gradnet", data, tmp_path / "run", quick("gradnet"), pseudo=tmp_path / "pseudo", steps=4,
-            progress=False,
-        )  # fmt: skip
+        train_quietly(
+            "gradnet", data, tmp_path / "run", quick("gradnet"), pseudo_labels=tmp_path / "pseudo", steps=4
+        )
     assert max(seen) == 0
-    assert "truth from" in read_summary(tmp_path / "run", "gradnet").preset
+    assert "pseudo labels from" in read_summary(tmp_path / "run", "gradnet").preset
 
     (tmp_path / "pseudo" / "000001_10.pfm").unlink()
     with pytest.raises(TrainingError, match="has no disparity for the frame 000001_10"):
-        train(
-            "gradnet", data, tmp_path / "run", quick("gradnet"), pseudo=tmp_path / "pseudo", steps=4, resume=True
-        )  # fmt: skip
+        train_quietly(
+            "gradnet",
+            data,
+            tmp_path / "run",
+            quick("gradnet"),
+            pseudo_labels=tmp_path / "pseudo",
+            steps=4,
+            resume=True,
+        )
 
 
 def test_validation_is_optional(tmp_path: Path) -> None:
     data = write_dataset(tmp_path / "set", 0, train=2)
-    summary = train("regressor", [(data, 1.0)], tmp_path / "run", quick_regressor(), steps=5, progress=False)
+    summary = train_quietly("regressor", [(data, 1.0)], tmp_path / "run", quick_regressor(), steps=5)
     assert summary.best_step == 5
     assert summary.validation == {}
 
@@ -356,49 +368,49 @@ def test_a_loss_that_is_not_finite_stops_the_run(data: Path, tmp_path: Path) -> 
     preset = quick_regressor()
     preset = replace(preset, optimizer=replace(preset.optimizer, learning_rate=1e30, clip_norm=None))
     with pytest.raises(TrainingError, match=r"the loss of step \d+ is (nan|inf), so training stopped"):
-        train("regressor", [(data, 1.0)], tmp_path, preset, steps=20, progress=False)
+        train_quietly("regressor", [(data, 1.0)], tmp_path, preset, steps=20)
 
 
 def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> None:
     source = [(data, 1.0)]
     with pytest.raises(TrainingError, match="no task 'depthnet'; there are regressor"):
-        train("depthnet", source, tmp_path)
+        train_quietly("depthnet", source, tmp_path)
     with pytest.raises(TrainingError, match="regressor has no preset 'huge'; there are tiny, small, full"):
-        train("regressor", source, tmp_path, "huge")
+        train_quietly("regressor", source, tmp_path, "huge")
     with pytest.raises(TrainingError, match="crops must be multiples of 64 each way, not 100x64"):
-        train("regressor", source, tmp_path, quick("regressor"), changes={"crop_width": 100})
+        train_quietly("regressor", source, tmp_path, quick("regressor"), changes={"crop_width": 100})
     with pytest.raises(
         TrainingError, match="correct_within_px does not apply here: a RegressorPreset has steps"
     ):
-        train("regressor", source, tmp_path, "tiny", changes={"correct_within_px": 3.0})
+        train_quietly("regressor", source, tmp_path, "tiny", changes={"correct_within_px": 3.0})
     with pytest.raises(TrainingError, match="16-bit floats need a GPU; bf16 works on CPUs too"):
-        train("regressor", source, tmp_path, "tiny", precision="16", device="cpu")
+        train_quietly("regressor", source, tmp_path, "tiny", precision="16", device="cpu")
     with pytest.raises(TrainingError, match="at least one step"):
-        train("regressor", source, tmp_path, "tiny", steps=0)
+        train_quietly("regressor", source, tmp_path, "tiny", steps=0)
     with pytest.raises(TrainingError, match="no trained regressor"):
-        train("confnet", source, tmp_path / "empty", quick("confnet"), progress=False)
+        train_quietly("confnet", source, tmp_path / "empty", quick("confnet"))
     with pytest.raises(TrainingError, match="already holds a regressor; continue it with --resume"):
-        train("regressor", source, run, quick_regressor(), steps=6, progress=False)
+        train_quietly("regressor", source, run, quick_regressor(), steps=6)
     with pytest.raises(TrainingError, match=r"started with another steps \(6, not 7\)"):
-        train("regressor", source, run, quick_regressor(), steps=7, resume=True, progress=False)
+        train_quietly("regressor", source, run, quick_regressor(), steps=7, resume=True)
     with (
         alone(run / "logs" / "regressor" / ".lock"),
         pytest.raises(TrainingError, match="another process is training its regressor right now"),
     ):
-        train("regressor", source, run, quick_regressor(), steps=6, resume=True, progress=False)
+        train_quietly("regressor", source, run, quick_regressor(), steps=6, resume=True)
     with pytest.raises(TrainingError, match="no device 'abacus'"):
-        train("regressor", source, tmp_path / "device", quick_regressor(), device="abacus")
+        train_quietly("regressor", source, tmp_path / "device", quick_regressor(), device="abacus")
     with pytest.raises(
         TrainingError, match=r"frames of 128x64 are smaller than the 320x128 .* \(--crop 128x64\)"
     ):
-        train("regressor", source, tmp_path / "crop", "tiny")
+        train_quietly("regressor", source, tmp_path / "crop", "tiny")
     # What is said first of a request with two faults: the one that --crop does not cure.
     with pytest.raises(
         TrainingError, match="holds no trained regressor, which confnet starts from; train one"
     ):
-        train("confnet", source, tmp_path / "crop", "tiny")
+        train_quietly("confnet", source, tmp_path / "crop", "tiny")
     with pytest.raises(DatasetError, match="no such folder"):
-        train("regressor", [(tmp_path / "nowhere", 1.0)], tmp_path / "x", "tiny")
+        train_quietly("regressor", [(tmp_path / "nowhere", 1.0)], tmp_path / "x", "tiny")
     assert not (tmp_path / "x").exists()
 
 
@@ -413,9 +425,9 @@ def test_a_proposed_crop_fits_all_data_sets_and_is_within_the_preset_s() -> None
 
 
 def test_another_regressor_is_not_overwritten(data: Path, run: Path, tmp_path: Path) -> None:
-    train("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, seed=9, progress=False)
+    train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, seed=9)
     with pytest.raises(TrainingError, match="already holds another regressor"):
-        train("gradnet", [(data, 1.0)], tmp_path, quick("gradnet"), init=run, steps=2, progress=False)
+        train_quietly("gradnet", [(data, 1.0)], tmp_path, quick("gradnet"), init=run, steps=2)
 
 
 def test_a_damaged_image_is_a_sentence(data: Path, tmp_path: Path) -> None:
@@ -423,4 +435,4 @@ def test_a_damaged_image_is_a_sentence(data: Path, tmp_path: Path) -> None:
     image = next((copy / "frames_cleanpass" / "TRAIN").rglob("*.png"))
     image.write_bytes(image.read_bytes()[:100])
     with pytest.raises(DatasetError, match=image.name):
-        train("regressor", [(copy, 1.0)], tmp_path / "run", quick_regressor(), steps=1, progress=False)
+        train_quietly("regressor", [(copy, 1.0)], tmp_path / "run", quick_regressor(), steps=1)

@@ -19,14 +19,14 @@ from training.networks import (
     predict_right,
 )
 from training.networks.cost_features import (
+    COST_FEATURE_CHANNELS,
     COST_OFFSETS_PX,
-    EVIDENCE_CHANNELS,
     SLOPE_CHANNELS,
-    Evidence,
+    CostFeatures,
     smooth_slopes,
 )
+from training.networks.inference import head_inputs, regress, regress_consistently
 from training.networks.regressors.dispnet import FeatureKind
-from training.prediction.inference import head_inputs, regress, regress_consistently
 
 
 @pytest.mark.parametrize(
@@ -59,10 +59,10 @@ def test_outputs_cover_every_pixel(half: bool) -> None:
     assert GradNet(config)(image, features).shape == (2, 2, 32, 64)
 
 
-def test_confnet_sees_evidence_where_configured() -> None:
-    """The published inputs come first, and the right view changes nothing but the evidence."""
+def test_confnet_sees_cost_features_where_configured() -> None:
+    """The published inputs come first, and the right view changes nothing but the cost features."""
     torch.manual_seed(0)
-    config = HeadConfig(feature_channels=5, width=4, hidden=4, evidence=True)
+    config = HeadConfig(feature_channels=5, width=4, hidden=4, cost_features=True)
     network = ConfNet(config).eval()
     left, right, other = torch.rand(3, 1, 3, 32, 64)
     features, disparity, consistency = (
@@ -71,35 +71,35 @@ def test_confnet_sees_evidence_where_configured() -> None:
         torch.rand(1, 1, 32, 64),
     )
     seen, seen_otherwise = (
-        network.inputs(features, consistency, Evidence(left, view, disparity)) for view in (right, other)
+        network.inputs(features, consistency, CostFeatures(left, view, disparity)) for view in (right, other)
     )
     joined, changed = network.joined_input(*seen), network.joined_input(*seen_otherwise)
-    plain = ConfNet(replace(config, evidence=False))
-    assert plain.inputs(features, consistency, Evidence(left, right, disparity)) == (
+    plain = ConfNet(replace(config, cost_features=False))
+    assert plain.inputs(features, consistency, CostFeatures(left, right, disparity)) == (
         left,
         features,
         consistency,
     )
     torch.testing.assert_close(joined[:, :9], plain.joined_input(left, features, consistency))
-    assert joined.shape == (1, 9 + EVIDENCE_CHANNELS, 32, 64)
+    assert joined.shape == (1, 9 + COST_FEATURE_CHANNELS, 32, 64)
     differs = (joined != changed).flatten(2).any(2)[0]
     assert differs.nonzero().flatten().tolist() == list(range(9, 9 + len(COST_OFFSETS_PX)))
     assert network.confidence(*seen).shape == (1, 1, 32, 64)
 
 
-def test_gradnet_sees_evidence_where_configured() -> None:
+def test_gradnet_sees_cost_features_where_configured() -> None:
     torch.manual_seed(0)
-    config = HeadConfig(feature_channels=5, width=4, hidden=4, evidence=True)
+    config = HeadConfig(feature_channels=5, width=4, hidden=4, cost_features=True)
     left, right = torch.rand(2, 1, 3, 32, 64)
     features, disparity = torch.rand(1, 5, 16, 32), torch.rand(1, 1, 32, 64) * 9
-    network, plain = GradNet(config), GradNet(replace(config, evidence=False))
-    evidence = Evidence(left, right, disparity)
-    assert plain.inputs(features, evidence) == (left, features)
-    joined = network.joined_input(*network.inputs(features, evidence))
-    assert joined.shape == (1, 8 + EVIDENCE_CHANNELS + SLOPE_CHANNELS, 32, 64)
+    network, plain = GradNet(config), GradNet(replace(config, cost_features=False))
+    cost_features = CostFeatures(left, right, disparity)
+    assert plain.inputs(features, cost_features) == (left, features)
+    joined = network.joined_input(*network.inputs(features, cost_features))
+    assert joined.shape == (1, 8 + COST_FEATURE_CHANNELS + SLOPE_CHANNELS, 32, 64)
     torch.testing.assert_close(joined[:, :8], plain.joined_input(left, features))
     torch.testing.assert_close(joined[:, -SLOPE_CHANNELS:], smooth_slopes(disparity))
-    assert network(*network.inputs(features, evidence)).shape == (1, 2, 32, 64)
+    assert network(*network.inputs(features, cost_features)).shape == (1, 2, 32, 64)
 
 
 def test_inputs_are_standardized_with_fixed_numbers() -> None:

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.training.synthetic import random_layer, render
+from tests.training.synthetic import NO_AUGMENTATION, random_layer, render
 from training.data.augmentation import (
     IDENTITY_CURVE,
-    NO_AUGMENTATION,
     AugmentationConfig,
     StereoPair,
     TrainingSample,

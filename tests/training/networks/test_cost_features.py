@@ -5,15 +5,15 @@ import torch
 
 from training.networks.cost_features import (
     COST_CEILING,
+    COST_FEATURE_CHANNELS,
     COST_OFFSETS_PX,
-    EVIDENCE_CHANNELS,
     LEFT_BORDER_CAP_PX,
     RESIDUAL_CEILING_PX,
     RESIDUAL_WINDOWS_PX,
     SLOPE_CHANNELS,
     SLOPE_WINDOWS_PX,
     SMOOTH_WITHIN_PX,
-    disparity_evidence,
+    cost_feature_maps,
     matching_costs,
     smooth_slopes,
 )
@@ -60,23 +60,23 @@ def test_the_disparity_is_compared_with_its_surroundings() -> None:
     rng = np.random.default_rng(2)
     disparity = rng.uniform(0, 30, (HEIGHT, WIDTH))
     image = torch.zeros(1, 3, HEIGHT, WIDTH, dtype=torch.float64)
-    evidence = disparity_evidence(image, image, torch.from_numpy(disparity)[None, None])[0].numpy()
-    assert evidence.shape == (EVIDENCE_CHANNELS, HEIGHT, WIDTH)
-    across, down = evidence[len(COST_OFFSETS_PX)], evidence[len(COST_OFFSETS_PX) + 1]
+    cost_features = cost_feature_maps(image, image, torch.from_numpy(disparity)[None, None])[0].numpy()
+    assert cost_features.shape == (COST_FEATURE_CHANNELS, HEIGHT, WIDTH)
+    across, down = cost_features[len(COST_OFFSETS_PX)], cost_features[len(COST_OFFSETS_PX) + 1]
     np.testing.assert_allclose(across[:, :-1], np.diff(disparity, axis=1).clip(-4, 4))
     np.testing.assert_allclose(down[:-1], np.diff(disparity, axis=0).clip(-4, 4))
     assert (across[:, -1] == 0).all()
     assert (down[-1] == 0).all()
     for index, window in enumerate(RESIDUAL_WINDOWS_PX):
-        residual, roughness = evidence[len(COST_OFFSETS_PX) + 2 + 2 * index :][:2]
+        residual, roughness = cost_features[len(COST_OFFSETS_PX) + 2 + 2 * index :][:2]
         expected = (disparity - windowed_mean(disparity, window)).clip(
             -RESIDUAL_CEILING_PX, RESIDUAL_CEILING_PX
         )
         np.testing.assert_allclose(residual, expected, atol=1e-9)
         np.testing.assert_allclose(roughness, windowed_mean(np.abs(expected), window), atol=1e-9)
     columns = np.broadcast_to(np.arange(WIDTH), (HEIGHT, WIDTH))
-    np.testing.assert_allclose(evidence[-2], columns)
-    np.testing.assert_allclose(evidence[-1], columns - disparity)
+    np.testing.assert_allclose(cost_features[-2], columns)
+    np.testing.assert_allclose(cost_features[-1], columns - disparity)
 
 
 def test_smooth_slopes_are_those_of_the_surface_beside_an_edge() -> None:
@@ -119,9 +119,9 @@ def windowed_mean(values: np.ndarray, window: int) -> np.ndarray:
 
 def test_it_is_bounded_for_any_disparity() -> None:
     image = torch.rand(1, 3, 8, 400)
-    evidence = disparity_evidence(image, image, torch.rand(1, 1, 8, 400) * 1e6)
-    assert torch.isfinite(evidence).all()
-    assert evidence.abs().max() <= LEFT_BORDER_CAP_PX
+    cost_features = cost_feature_maps(image, image, torch.rand(1, 1, 8, 400) * 1e6)
+    assert torch.isfinite(cost_features).all()
+    assert cost_features.abs().max() <= LEFT_BORDER_CAP_PX
 
 
 def test_an_image_one_pixel_wide_has_costs_too() -> None:

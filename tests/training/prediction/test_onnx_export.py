@@ -9,7 +9,7 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
-from tests.training.test_predict import edit_description, save_run
+from tests.training.prediction.test_predictor import edit_description, save_run
 from training.errors import TrainingError
 from training.networks import ConfNet, Correlation1D
 from training.prediction.onnx_export import ShiftedCorrelation, export_model

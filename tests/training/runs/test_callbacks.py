@@ -8,7 +8,8 @@ import pytorch_lightning as pl
 import torch
 from torch import Tensor
 
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
+from training.metrics import end_point_error
 from training.presets import find_preset
 from training.runs.callbacks import BestWeights
 from training.tasks import RegressorTask
@@ -51,9 +52,9 @@ class _Answers(RegressorTask):
         network: Any = torch.nn.Identity()
         super().__init__(preset, network, steps=1, seed=0)
 
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-        answer, truth = batch["left"][0], batch["disparity"][0]
-        return {"epe": (answer - truth).abs().nanmean()}, {"disparity": answer}
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        answer = batch.left[:, :1]
+        return {"epe": end_point_error(answer, batch.disparity)}, {"disparity": answer}
 
 
 @pytest.mark.parametrize(
@@ -69,7 +70,12 @@ def test_validation_figures_are_means_over_the_frames_with_truth(
     answers: tuple[float, ...], truths: tuple[float, ...], epe: float
 ) -> None:
     frames = [
-        {"left": torch.full((2, 2), answer), "disparity": torch.full((2, 2), truth)}
+        StereoBatch(
+            left=torch.full((3, 2, 2), answer),
+            right=torch.zeros(3, 2, 2),
+            disparity=torch.full((1, 2, 2), truth),
+            gradient=torch.zeros(2, 2, 2),
+        )
         for answer, truth in zip(answers, truths, strict=True)
     ]
     trainer = pl.Trainer(

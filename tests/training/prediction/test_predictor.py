@@ -12,8 +12,8 @@ from torch import Tensor, nn
 
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, DispNetOutput, GradNet, HeadConfig
-from training.networks.cost_features import Evidence
-from training.prediction.inference import estimate
+from training.networks.cost_features import CostFeatures
+from training.networks.inference import estimate
 from training.prediction.predictor import StereoPredictor
 from training.runs.weights import TrainingSummary, load_gradnet, load_regressor, read_summary, save_weights
 
@@ -30,7 +30,7 @@ def save_run(run: Path) -> tuple[DispNetCorr1D, ConfNet, GradNet]:
     regressor(torch.rand(2, 3, 64, 64), torch.rand(2, 3, 64, 64))  # moves BatchNorm's statistics
     save_weights(run, "regressor", regressor, SUMMARY)
     head = HeadConfig(width=4, hidden=4).on(regressor)
-    confnet, gradnet = ConfNet(replace(head, evidence=True)), GradNet(head)
+    confnet, gradnet = ConfNet(replace(head, cost_features=True)), GradNet(head)
     confnet.standardize(torch.rand(len(confnet.input_mean)), torch.rand(len(confnet.input_mean)) + 0.5)
     digest = load_regressor(run).sha256
     save_weights(run, "confnet", confnet, SUMMARY, digest)
@@ -111,10 +111,10 @@ class SlopeOracle(PlaneOracle):
 
     config = HeadConfig()
 
-    def inputs(self, features: Tensor, evidence: Evidence) -> tuple[Tensor, ...]:
-        assert evidence.right.shape == evidence.left.shape
-        assert evidence.disparity.shape == (1, 1, *evidence.left.shape[-2:])
-        return evidence.left, features
+    def inputs(self, features: Tensor, cost_features: CostFeatures) -> tuple[Tensor, ...]:
+        assert cost_features.right.shape == cost_features.left.shape
+        assert cost_features.disparity.shape == (1, 1, *cost_features.left.shape[-2:])
+        return cost_features.left, features
 
     def forward(self, left: Tensor, features: Tensor) -> Tensor:  # type: ignore[override]  # noqa: ARG002
         stretch_x, stretch_y = self.stretch(left)
