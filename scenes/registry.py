@@ -9,7 +9,7 @@ from scenes.discovery import modules_in
 from scenes.family import Family, FamilyConfig
 from scenes.spec import Scene
 from scenes.user_assets.pool import AssetPool
-from scenes.user_assets.replacement import with_own_content
+from scenes.user_assets.replacement import with_user_assets
 
 FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in modules_in(scenes.families)}
 
@@ -30,4 +30,4 @@ def sample_scene(
         raise ValueError(f"{family} takes a {kind.config.__name__}, not a {type(config).__name__}")
     assets = AssetPool() if assets is None else assets
     scene = kind.sample(rng, config.with_assets(assets))
-    return with_own_content(rng, scene, assets, kind.replaceable) if kind.replaceable else scene
+    return with_user_assets(rng, scene, assets, kind.replaceable) if kind.replaceable else scene

@@ -282,7 +282,7 @@ class FinalPass:
     """Share of the light lost in the corners, 0..1."""
     exposure_difference_ev: float = 0.0
     """The right eye's exposure against the left's, in stops."""
-    right_eye_color: Color = (1.0, 1.0, 1.0)
+    right_view_color: Color = (1.0, 1.0, 1.0)
     """The right eye's colour balance against the left's, gain an RGB channel."""
 
 

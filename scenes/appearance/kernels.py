@@ -96,7 +96,7 @@ def nearest_of_grid(x, y, point_x, point_y, cells):
 
 
 @njit(cache=True)
-def put_on_top(top, inside, row, column, number):
+def stamp(top, inside, row, column, number):
     """Write a number into a periodic picture (N, N) where a square mask about (row, column) is set."""
     size, side = len(top), len(inside)
     for i in range(side):

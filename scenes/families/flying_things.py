@@ -107,7 +107,7 @@ class FlyingThingsConfig(FamilyConfig):
         near, far = (least * (share / low) ** stretch for share in self.background_disparity_share)
         return replace(self, disparity_share=(least, greatest), background_disparity_share=(near, far))
 
-    def draws_own(self, rng: np.random.Generator, among: tuple[Asset, ...]) -> Asset | None:
+    def draw_user_asset(self, rng: np.random.Generator, among: tuple[Asset, ...]) -> Asset | None:
         """One of the user's files of a kind, or None for one of the generator's own; draws only if there are any."""
         return choose(rng, among) if among and chance(rng, self.user_share) else None
 
@@ -326,13 +326,13 @@ def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Ma
 
 def _flyer_material(rng: np.random.Generator, config: FlyingThingsConfig, size_px: float) -> Material:
     material = sample_material(rng, size_px)
-    own = config.draws_own(rng, config.assets.textures)
+    own = config.draw_user_asset(rng, config.assets.textures)
     return material if own is None else replace(material, color=UserTexture(own.sha256))
 
 
 def _environment(rng: np.random.Generator, config: FlyingThingsConfig) -> Texture:
     sky = Sky.sample(rng, 1024)
-    own = config.draws_own(rng, config.assets.environments)
+    own = config.draw_user_asset(rng, config.assets.environments)
     return sky if own is None else UserEnvironment(own.sha256)
 
 
@@ -342,7 +342,7 @@ def _flyer(
     """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth."""
     config = rig.config
     shape = _sample_shape(rng, {name: share * (1 - config.complexity) for name, share in _PLAIN.items()})
-    if own := config.draws_own(rng, config.assets.meshes):
+    if own := config.draw_user_asset(rng, config.assets.meshes):
         shape = UserMesh(own.sha256)
     stretch = rng.uniform(0.8, 1.25, 3)
     near_share = config.disparity_share[1]

@@ -1,6 +1,6 @@
-"""Living figures: skeletons of random proportions, the flesh, fur and clothes on them, and how they move.
+"""Living characters: skeletons of random proportions, the flesh, fur and clothes on them, and how they move.
 
-A figure faces +x, its left is +y, and its feet stand at z = 0. Its coordinates are in body units, about one
+A character faces +x, its left is +y, and its feet stand at z = 0. Its coordinates are in body units, about one
 body height.
 """
 
@@ -13,30 +13,30 @@ import numpy as np
 
 from scenes.motion.deformations.articulated import Articulated, Joint
 from scenes.random_draws import chance, choose, integer, new_seed, uniform
-from scenes.shapes.anchored import Standing
+from scenes.shapes.anchored import PartedShape
 from scenes.shapes.nature.creatures import Eyeballs, Limb, SoftBody
 from scenes.spec import Vector
 
-BONE = -1
+SKINNED = -1
 """`carried_by` of a part that is skinned."""
 
 
 @dataclass(frozen=True)
-class FigurePart:
-    """One mesh of a figure."""
+class CharacterPart:
+    """One mesh of a character."""
 
-    shape: Standing
+    shape: PartedShape
     stuff: str
     """What it is made of: fur, skin, cloth, hair, horn, eye, leather, wood."""
-    carried_by: int = BONE
-    """Joint it follows rigidly, or `BONE`."""
+    carried_by: int = SKINNED
+    """Joint it follows rigidly, or `SKINNED`."""
 
 
 @dataclass(frozen=True)
-class Figure:
+class Character:
     """A body that can be put into a scene."""
 
-    parts: tuple[FigurePart, ...]
+    parts: tuple[CharacterPart, ...]
     joints: tuple[Joint, ...]
     feet: tuple[int, ...]
     period_frames: float
@@ -47,7 +47,7 @@ class Figure:
     reach: float
     """Farthest any of it gets from its foot's spot on the ground plan, in body units."""
 
-    def deformation(self, part: FigurePart) -> Articulated:
+    def deformation(self, part: CharacterPart) -> Articulated:
         """The motion of one of its parts, in that part's mesh coordinates."""
         frame = part.shape.frame()
         x, y, z = (float(value) for value in frame.centre)
@@ -61,8 +61,8 @@ class Figure:
         )
 
 
-class Body:
-    """A figure under construction."""
+class CharacterBuilder:
+    """A character under construction."""
 
     def __init__(self) -> None:
         self.joints: list[Joint] = []
@@ -104,7 +104,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Gait:
-    """How a figure moves."""
+    """How a character moves."""
 
     walks: bool
     leg_deg: float
@@ -138,14 +138,14 @@ class Coat:
     """Grid cells along the body: how finely it is meshed."""
 
 
-def sample_creature(rng: np.random.Generator, coat: Coat) -> Figure:
+def sample_creature(rng: np.random.Generator, coat: Coat) -> Character:
     """A soft animal that never was: two-legged, four-legged or a crawler."""
     plan = choose(rng, (_biped, _quadruped, _crawler), (0.5, 0.35, 0.15))
     return plan(rng, coat)
 
 
-def _biped(rng: np.random.Generator, coat: Coat) -> Figure:
-    body, gait = Body(), sample_gait(rng)
+def _biped(rng: np.random.Generator, coat: Coat) -> Character:
+    body, gait = CharacterBuilder(), sample_gait(rng)
     leg, trunk = uniform(rng, 0.12, 0.34), uniform(rng, 0.24, 0.42)
     girth = uniform(rng, 0.11, 0.2)
     hip, chest = leg + 0.5 * girth, leg + 0.5 * girth + trunk
@@ -180,8 +180,8 @@ def _biped(rng: np.random.Generator, coat: Coat) -> Figure:
     return _creature(rng, body, gait, coat, feet, head, leg)
 
 
-def _quadruped(rng: np.random.Generator, coat: Coat) -> Figure:
-    body, gait = Body(), sample_gait(rng)
+def _quadruped(rng: np.random.Generator, coat: Coat) -> Character:
+    body, gait = CharacterBuilder(), sample_gait(rng)
     leg, length, girth = uniform(rng, 0.2, 0.45), uniform(rng, 0.35, 0.6), uniform(rng, 0.11, 0.19)
     back = leg + 0.6 * girth
     root = body.bone(
@@ -220,9 +220,9 @@ def _quadruped(rng: np.random.Generator, coat: Coat) -> Figure:
     return _creature(rng, body, gait, coat, feet, head, leg)
 
 
-def _crawler(rng: np.random.Generator, coat: Coat) -> Figure:
+def _crawler(rng: np.random.Generator, coat: Coat) -> Character:
     """A row of balls on stubby legs that wriggles."""
-    body, gait = Body(), sample_gait(rng)
+    body, gait = CharacterBuilder(), sample_gait(rng)
     segments, girth = integer(rng, 5, 8), uniform(rng, 0.09, 0.14)
     step = 1.35 * girth
     root, parent = -1, -1
@@ -249,7 +249,9 @@ def _crawler(rng: np.random.Generator, coat: Coat) -> Figure:
     return _creature(rng, body, gait, coat, [], head, 0.0)
 
 
-def _leg(body: Body, gait: Gait, parent: int, hip: Vector, side: float, radius: float, phase: float) -> int:
+def _leg(
+    body: CharacterBuilder, gait: Gait, parent: int, hip: Vector, side: float, radius: float, phase: float
+) -> int:
     """Thigh, shin and foot; returns the joint whose end is on the ground."""
     x, y, z = hip
     knee, ankle = (x + 0.06 * z, y + 0.01 * side, 0.52 * z), (x, y + 0.015 * side, 0.8 * radius)
@@ -263,7 +265,9 @@ def _leg(body: Body, gait: Gait, parent: int, hip: Vector, side: float, radius: 
     return shin
 
 
-def _tail(rng: np.random.Generator, body: Body, parent: int, start: Vector, radius: float) -> None:
+def _tail(
+    rng: np.random.Generator, body: CharacterBuilder, parent: int, start: Vector, radius: float
+) -> None:
     """A chain that curls up or hangs, wagging more towards its tip."""
     joints, curl = integer(rng, 3, 5), uniform(rng, -0.25, 0.7)
     length, angle = uniform(rng, 0.08, 0.16), uniform(rng, -0.5, 0.4)
@@ -279,7 +283,9 @@ def _tail(rng: np.random.Generator, body: Body, parent: int, start: Vector, radi
         start, angle = end, angle + curl
 
 
-def _head(rng: np.random.Generator, body: Body, gait: Gait, parent: int, neck: Vector, skull: float) -> int:
+def _head(
+    rng: np.random.Generator, body: CharacterBuilder, gait: Gait, parent: int, neck: Vector, skull: float
+) -> int:
     """Skull, snout, ears, sometimes horns; the eyes sit where `_eyes` puts them."""
     x, y, z = neck
     middle = (x + 0.35 * skull, y, z + 0.75 * skull)
@@ -335,8 +341,14 @@ def _head(rng: np.random.Generator, body: Body, gait: Gait, parent: int, neck: V
 
 
 def _creature(
-    rng: np.random.Generator, body: Body, gait: Gait, coat: Coat, feet: list[int], head: int, leg: float
-) -> Figure:
+    rng: np.random.Generator,
+    body: CharacterBuilder,
+    gait: Gait,
+    coat: Coat,
+    feet: list[int],
+    head: int,
+    leg: float,
+) -> Character:
     skin = SoftBody(
         limbs=tuple(body.limbs["body"]),
         blend=uniform(rng, 0.008, 0.016),
@@ -349,21 +361,28 @@ def _creature(
     )
     eyes = body.limbs["eye"]
     balls = Eyeballs(tuple(eye.start for eye in eyes), (1.0, 0.0, 0.12), eyes[0].start_radius)
-    parts = [FigurePart(skin, "fur"), FigurePart(balls, "eye", head)]
+    parts = [CharacterPart(skin, "fur"), CharacterPart(balls, "eye", head)]
     if "horn" in body.limbs:
         horns = SoftBody(tuple(body.limbs["horn"]), 0.002, 0.0, 0, 0.0, (0.0, 0.0, 0.0), 30, new_seed(rng))
-        parts.append(FigurePart(horns, "horn", head))
-    return assembled(tuple(parts), body, gait, tuple(feet), leg, coat.tuft_length if coat.tufts else 0.0)
+        parts.append(CharacterPart(horns, "horn", head))
+    return assemble_character(
+        tuple(parts), body, gait, tuple(feet), leg, coat.tuft_length if coat.tufts else 0.0
+    )
 
 
-def assembled(
-    parts: tuple[FigurePart, ...], body: Body, gait: Gait, feet: tuple[int, ...], leg: float, fringe: float
-) -> Figure:
+def assemble_character(
+    parts: tuple[CharacterPart, ...],
+    body: CharacterBuilder,
+    gait: Gait,
+    feet: tuple[int, ...],
+    leg: float,
+    fringe: float,
+) -> Character:
     ends = [(limb.end, limb.end_radius) for group in body.limbs.values() for limb in group]
     ends += [(limb.start, limb.start_radius) for group in body.limbs.values() for limb in group]
     # A walker covers four times the reach of a leg's swing in a period.
     stride = 4 * leg * math.sin(math.radians(gait.leg_deg)) / gait.period_frames if gait.walks else 0.0
-    return Figure(
+    return Character(
         parts=parts,
         joints=tuple(body.joints),
         feet=feet,

@@ -22,17 +22,17 @@ NEAREST_SHARE = 0.105
 
 @dataclass(frozen=True)
 class LandscapeConfig(FamilyConfig):
-    """What families of landscapes have in common: a camera that looks at a figure on open land."""
+    """What families of landscapes have in common: a camera that looks at a character on open land."""
 
     focal_mm: Range = (22.0, 45.0)
     """Focal length on a sensor 32 mm wide."""
     focus_disparity_share: Range = (0.016, 0.045)
-    """Disparity of the figure the scene is about, as a share of the image width (0.016 is 15 px at 960);
+    """Disparity of the character the scene is about, as a share of the image width (0.016 is 15 px at 960);
     it sets the baseline."""
     focus_height_share: Range = (0.45, 0.8)
-    """Height of that figure, as a share of the image height."""
+    """Height of that character, as a share of the image height."""
     camera_speed: Range = (0.0, 0.015)
-    """Speed of the camera, as a share of the figure's distance per frame."""
+    """Speed of the camera, as a share of the character's distance per frame."""
     camera_turn_deg: Range = (0.0, 0.5)
     """How fast the camera turns, degrees per frame."""
     sky_strength: Range = (0.7, 1.6)
@@ -93,7 +93,7 @@ class Focus:
     """Its height."""
     disparity_share: float
     """Its disparity as a share of the image width."""
-    eye_height_m: float
+    camera_height_m: float
     above_deg: float
     """How far above its middle the camera looks."""
     focal_mm: float
@@ -121,7 +121,7 @@ def sample_camera(
     angle = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle)], -1)
     around = np.concatenate([circle * share for share in (0.0, 0.5, 1.0)]) * (reach_m + baseline_m)
-    above_m = max(focus.eye_height_m, reach_m + 0.4 * focus.eye_height_m)
+    above_m = max(focus.camera_height_m, reach_m + 0.4 * focus.camera_height_m)
     eye_m = float(land.height_m(around).max()) + above_m
     target_m = float(land.height_m(np.array([[0.0, focus.depth_m]]))[0]) + 0.5 * focus.size_m
     pitch_deg = math.degrees(math.atan2(eye_m - target_m, focus.depth_m)) - focus.above_deg
@@ -138,7 +138,7 @@ def sample_camera(
     return StereoCamera(width, height, focus.focal_mm, baseline_m, motion)
 
 
-def eye_positions(camera: StereoCamera, frames: int) -> NDArray[np.float64]:
+def camera_positions(camera: StereoCamera, frames: int) -> NDArray[np.float64]:
     """(N, 3) where both eyes are while the scene lasts."""
     return np.array(
         [camera.pose(eye, time)[:3, 3] for time in exposure_times(frames) for eye in ("left", "right")]
@@ -156,20 +156,20 @@ def sample_focus(
     focal_mm: float,
     depth_m: float,
     size_m: float,
-    eye_height_m: float,
+    camera_height_m: float,
 ) -> Focus:
-    """Look at a figure of a size and at a distance from about a height, the figure about mid-image.
+    """Look at a character of a size and at a distance from about a height, the character about mid-image.
 
     The eye is raised where the image's lower edge would otherwise show ground nearer than allowed.
     """
     share = uniform(rng, *config.focus_disparity_share)
     half_high = half_height(focal_mm, config)
-    height_m = max(eye_height_m, 1.3 * (half_high + 0.1) * depth_m * share / NEAREST_SHARE)
+    height_m = max(camera_height_m, 1.3 * (half_high + 0.1) * depth_m * share / NEAREST_SHARE)
     return Focus(
         depth_m=depth_m,
         size_m=size_m,
         disparity_share=share,
-        eye_height_m=height_m,
+        camera_height_m=height_m,
         above_deg=uniform(rng, -0.05, 0.3) * math.degrees(half_high),
         focal_mm=focal_mm,
         speed_m=uniform(rng, *config.camera_speed) * depth_m,
@@ -195,5 +195,5 @@ def sample_final(
         noise=uniform(rng, 0.0, 0.02),
         vignetting=uniform(rng, 0.0, 0.3),
         exposure_difference_ev=float(rng.normal(0.0, 0.08)),
-        right_eye_color=vector(np.exp(rng.normal(0.0, 0.015, 3))),
+        right_view_color=vector(np.exp(rng.normal(0.0, 0.015, 3))),
     )

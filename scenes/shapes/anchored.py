@@ -32,7 +32,7 @@ class Frame:
 
 
 @lru_cache(maxsize=48)
-def _parts_of(shape: Standing) -> dict[str, Part]:
+def _parts_of(shape: PartedShape) -> dict[str, Part]:
     """A shape's parts, kept for a while: placing a thing, and building each of its parts, asks again."""
     parts = shape.parts()
     for vertices, triangles in parts.values():
@@ -41,7 +41,7 @@ def _parts_of(shape: Standing) -> dict[str, Part]:
 
 
 @dataclass(frozen=True)
-class Standing(Shape):
+class PartedShape(Shape):
     """A shape built with its foot at the origin and z up, out of closed named parts.
 
     Two records that differ only in `only` are parts of one thing: placed by their frames they fit together.

@@ -16,7 +16,7 @@ from scenes.textures.layers import Layered
 from scenes.textures.marks import BlurredShapes, DeadLeaves, Facade, GlyphRows
 from scenes.textures.noise import WoodPlanks
 from scenes.textures.plain import NearTextureless, SolidColor
-from scenes.textures.streets import Asphalt, Paving, RoadSign, WheelFace, WornPaint
+from scenes.textures.streets import Asphalt, Paving, RoadMarkingPaint, RoadSign, WheelFace
 from scenes.textures.tiles import Bricks, Plaid, Stripes
 
 WINDOW_FRAMES: tuple[Srgb, ...] = (
@@ -67,7 +67,7 @@ def kerb_stone(rng: np.random.Generator) -> Material:
 
 
 def road_paint(rng: np.random.Generator, yellow: bool = False) -> Material:
-    paint = WornPaint.sample(rng, 256)
+    paint = RoadMarkingPaint.sample(rng, 256)
     return tiled(replace(paint, color=shade(0.8, 0.15, 88.0)) if yellow else paint, 2.2)
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from scenes.placement.assembly import Assembly
 from scenes.random_draws import chance, integer, uniform
 from scenes.shapes.metric import MetricShape, standing
-from scenes.shapes.street.road import Course, Field, Kerb, RoadPaint, RoadStrip, Stripe
+from scenes.shapes.street.road import Course, Field, Kerb, RoadMarkings, RoadStrip, Stripe
 from scenes.streets import materials as finishes
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
@@ -131,7 +131,7 @@ def _paint(
     ]
     for name, items, material in groups:
         if items:
-            _lay(scene, name, RoadPaint(course, tuple(items), road), material)
+            _lay(scene, name, RoadMarkings(course, tuple(items), road), material)
 
 
 def _dashes(course: Course, t_m: float, half_m: float, dash_m: float, gap_m: float) -> list[Stripe]:
@@ -190,5 +190,5 @@ def _repairs(
         )
         patches.append(Stripe(s, s + long, t + wide, t - wide, shear=uniform(rng, -0.2, 0.2)))
     if patches:
-        shape = RoadPaint(course, tuple(patches), road, thickness_m=0.003)
+        shape = RoadMarkings(course, tuple(patches), road, thickness_m=0.003)
         _lay(scene, "repairs", shape, scene.material(finishes.tarmac_patch(rng)))

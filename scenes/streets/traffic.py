@@ -30,7 +30,7 @@ _KEY_M = 4.0
 _TURN_KEY = 2.0
 """Key poses of a turning wheel are at most this far apart, radians."""
 _FINE_M = 40.0
-"""Standing vehicles farther along the street than this have coarser wheels."""
+"""PartedShape vehicles farther along the street than this have coarser wheels."""
 _CAR_KINDS = ("hatchback", "hatchback", "saloon", "estate", "suv", "suv")
 
 

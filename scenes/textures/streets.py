@@ -36,7 +36,7 @@ class Asphalt(Texture):
 
     size: int
     seed: int
-    tone: Srgb
+    color: Srgb
     stones: float
     """Contrast of the grit, standard deviation relative to the tone."""
     patches: float
@@ -53,7 +53,7 @@ class Asphalt(Texture):
         return cls(
             size=size,
             seed=new_seed(rng),
-            tone=shade(uniform(rng, 0.36, 0.58), uniform(rng, 0.0, 0.02), uniform(rng, 20.0, 280.0)),
+            color=shade(uniform(rng, 0.36, 0.58), uniform(rng, 0.0, 0.02), uniform(rng, 20.0, 280.0)),
             stones=uniform(rng, 0.1, 0.22),
             patches=uniform(rng, 0.04, 0.12),
             cracks=uniform(rng, 0.0, 0.6),
@@ -72,7 +72,7 @@ class Asphalt(Texture):
             slow + np.float32(0.7) * np.roll(slow, self.size // 3, 0), 1.2 - 2 * self.cracks, 0.8
         )
         crack = (1 - smooth_step(second - first, 0.02, 0.02)) * broken * np.float32(self.cracks > 0.1)
-        picture = paint(self.tone) * (np.clip(light, 0.25, 2.0) * (1 - np.float32(0.6) * crack))
+        picture = paint(self.color) * (np.clip(light, 0.25, 2.0) * (1 - np.float32(0.6) * crack))
         return finish(picture, rng, 0.06)
 
 
@@ -129,7 +129,7 @@ class Paving(Texture):
 
 
 @dataclass(frozen=True)
-class WornPaint(Texture):
+class RoadMarkingPaint(Texture):
     """Road paint that has been driven over."""
 
     size: int

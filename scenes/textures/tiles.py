@@ -288,8 +288,8 @@ class Weave(Texture):
         across = np.abs(np.where(weft_on_top, fraction(v), fraction(u)) - np.float32(0.5))
         height = np.cos(np.pi * along) * (1 - (2 * across) ** 2 * np.float32(0.6))
         band = 1 - smooth_step(across, 0.5 - self.gap / 2, 0.12)
-        tones = to_unit(spectral_noise(rng, self.size, 0.8, 2))
+        shading = to_unit(spectral_noise(rng, self.size, 0.8, 2))
         color = flat_colors(weft_on_top.astype(np.int32), self.palette)
         shade = np.float32(0.3) + np.float32(0.9) * np.sqrt(np.abs(height)) * band
-        light = shade * (np.float32(0.75) + np.float32(0.5) * tones)
+        light = shade * (np.float32(0.75) + np.float32(0.5) * shading)
         return finish(color * light, rng, self.grain)

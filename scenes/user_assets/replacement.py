@@ -30,17 +30,17 @@ class Replaceable:
     """Things whose materials may wear a picture of the user's."""
 
 
-def with_own_content(
+def with_user_assets(
     rng: np.random.Generator, scene: Scene, assets: AssetPool, replaceable: Replaceable
 ) -> Scene:
     """The scene with about half of what is replaceable made from the user's files."""
     objects, materials, world = scene.objects, scene.materials, scene.world
     if assets.meshes:
-        objects = tuple(_own_shape(rng, thing, assets, replaceable) for thing in objects)
+        objects = tuple(_with_user_mesh(rng, thing, assets, replaceable) for thing in objects)
     if assets.textures:
         painted = {t.material for t in scene.objects if re.fullmatch(replaceable.painted, t.name)}
         materials = tuple(
-            _own_picture(rng, material, assets) if index in painted else material
+            _with_user_texture(rng, material, assets) if index in painted else material
             for index, material in enumerate(materials)
         )
     if assets.environments and chance(rng, USER_SHARE):
@@ -49,13 +49,13 @@ def with_own_content(
     return replace(scene, objects=objects, materials=materials, world=world)
 
 
-def _own_picture(rng: np.random.Generator, material: Material, assets: AssetPool) -> Material:
+def _with_user_texture(rng: np.random.Generator, material: Material, assets: AssetPool) -> Material:
     if not chance(rng, USER_SHARE):
         return material
     return replace(material, color=UserTexture(choose(rng, assets.textures).sha256))
 
 
-def _own_shape(
+def _with_user_mesh(
     rng: np.random.Generator, thing: SceneObject, assets: AssetPool, replaceable: Replaceable
 ) -> SceneObject:
     """A mesh of the user's in a prop's place, on its foot and within its box, so that what was free stays free."""

@@ -72,7 +72,7 @@ def test_streets_have_what_streets_have() -> None:
     for scene in scenes:
         for kind in {type(thing.shape).__name__ for thing in scene.objects}:
             seen[kind] += 1
-    for kind in ("RoadStrip", "RoadPaint", "Kerb", "CarBody", "CarGlass", "Wheel", "LampPost"):
+    for kind in ("RoadStrip", "RoadMarkings", "Kerb", "CarBody", "CarGlass", "Wheel", "LampPost"):
         assert seen[kind] == len(scenes), kind
     for kind in ("HouseWalls", "HouseWindows", "TreeCrown", "PersonTop", "SignFace", "Fence", "VanBody"):
         assert seen[kind] >= 2, kind

@@ -12,7 +12,7 @@ from scenes.geometry.building import Triangles, Vertices, icosphere, joined, sca
 from scenes.geometry.implicit_surfaces import blended_capsules, surface_net
 from scenes.geometry.mesh import Mesh
 from scenes.random_draws import chance, integer, log_uniform, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import Part, PartedShape
 from scenes.shapes.solids.organic import wave_noise
 from scenes.spec import Vector
 
@@ -28,7 +28,7 @@ class Limb:
 
 
 @dataclass(frozen=True)
-class SoftBody(Standing):
+class SoftBody(PartedShape):
     """Limbs melted into one smooth body, as plump or as furry as asked for: creatures, robes, statues."""
 
     limbs: tuple[Limb, ...]
@@ -144,7 +144,7 @@ def _locks(
 
 
 @dataclass(frozen=True)
-class Eyeballs(Standing):
+class Eyeballs(PartedShape):
     """Balls that look along a direction, the iris mapped about it; texture coordinates centre on the iris."""
 
     centres: tuple[Vector, ...]
@@ -186,7 +186,7 @@ def iris_repeats(eyes: Eyeballs) -> float:
 
 
 @dataclass(frozen=True)
-class Staff(Standing):
+class Staff(PartedShape):
     """A crooked stick with a thick end: staffs, spears, clubs."""
 
     foot: Vector

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scenes.geometry.building import Triangles, Vertices, grid_triangles, icosphere, joined, revolve, solid
 from scenes.geometry.mesh import Mesh
 from scenes.random_draws import chance, integer, log_uniform, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import Part, PartedShape
 from scenes.shapes.solids.basic import sample_proportions
 from scenes.shapes.solids.organic import wave_noise
 from scenes.spec import Shape, Vector
@@ -139,7 +139,7 @@ def block_under(top: NDArray[np.float64], floor: float) -> tuple[Vertices, Trian
 
 
 @dataclass(frozen=True)
-class Cavern(Standing):
+class Cavern(PartedShape):
     """A winding tunnel through rock, open at both ends: its wall is solid, a traveller inside is not.
 
     It runs along +y from y = 0; the axis is at the origin there. Its radius is about 1.
@@ -232,7 +232,7 @@ class Boulder(Shape):
 
 
 @dataclass(frozen=True)
-class Dripstone(Standing):
+class Dripstone(PartedShape):
     """A cluster of lumpy cones: stalagmites; turned over, stalactites."""
 
     cones: int

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scenes.geometry.building import cross_section, grid_triangles, joined, manifold_arrays
 from scenes.random_draws import chance, integer, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import Part, PartedShape
 from scenes.shapes.solids.organic import wave_noise
 
 _BOX = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
@@ -46,7 +46,7 @@ def boxes(
 
 
 @dataclass(frozen=True)
-class Column(Standing):
+class Column(PartedShape):
     """A fluted or plain shaft on a base, with a capital, or broken off."""
 
     slenderness: float
@@ -132,7 +132,7 @@ class Column(Standing):
 
 
 @dataclass(frozen=True)
-class Archway(Standing):
+class Archway(PartedShape):
     """A wall with round-arched openings side by side: gates, arcades, aqueducts, bridges."""
 
     openings: int
@@ -197,7 +197,7 @@ class Archway(Standing):
 
 
 @dataclass(frozen=True)
-class BlockWall(Standing):
+class BlockWall(PartedShape):
     """Courses of single stones, along a line or an arc, the top courses partly fallen: walls, towers."""
 
     courses: int
@@ -270,7 +270,7 @@ class BlockWall(Standing):
 
 
 @dataclass(frozen=True)
-class Steps(Standing):
+class Steps(PartedShape):
     """A flight of worn steps up to a landing."""
 
     steps: int
@@ -315,7 +315,7 @@ class Steps(Standing):
 
 
 @dataclass(frozen=True)
-class House(Standing):
+class House(PartedShape):
     """Walls with windows and a door cut into them, and a gabled roof that overhangs them."""
 
     length: float

@@ -14,12 +14,12 @@ from scenes.geometry.building import joined, revolve, struts
 from scenes.geometry.leaves import arched, around, horizontal_side, strips
 from scenes.geometry.stems import UP, leaf_cloud, stem, unit, winding_path
 from scenes.random_draws import choose, integer, log_uniform, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import Part, PartedShape
 from scenes.spec import Shape
 
 
 @dataclass(frozen=True)
-class GrassTuft(Standing):
+class GrassTuft(PartedShape):
     """Blades growing from a disc, bending outward: grass, reeds, a mop of hair."""
 
     blades: int
@@ -67,7 +67,7 @@ class GrassTuft(Standing):
 
 
 @dataclass(frozen=True)
-class Fern(Standing):
+class Fern(PartedShape):
     """Arching fronds with a row of leaflets on either side."""
 
     fronds: int
@@ -119,7 +119,7 @@ class Fern(Standing):
 
 
 @dataclass(frozen=True)
-class BroadLeaves(Standing):
+class BroadLeaves(PartedShape):
     """A rosette of large leaves on arching stalks: banana, hosta, rubber plant, agave."""
 
     leaves: int
@@ -168,7 +168,7 @@ class BroadLeaves(Standing):
 
 
 @dataclass(frozen=True)
-class Bush(Standing):
+class Bush(PartedShape):
     """A heap of leafy balls with twigs inside."""
 
     clumps: int
@@ -203,7 +203,7 @@ class Bush(Standing):
 
 
 @dataclass(frozen=True)
-class Vine(Standing):
+class Vine(PartedShape):
     """A hanging, winding cord with leaves along it: liana, ivy."""
 
     wobble: float
@@ -240,7 +240,7 @@ class Vine(Standing):
 
 
 @dataclass(frozen=True)
-class Mushroom(Standing):
+class Mushroom(PartedShape):
     """A bent stem under a cap: toadstool, bolete, bracket."""
 
     cap_radius: float

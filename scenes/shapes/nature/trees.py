@@ -11,11 +11,11 @@ from scenes.geometry.building import Vertices, joined
 from scenes.geometry.leaves import arched, around, horizontal_side, strips
 from scenes.geometry.stems import UP, leaf_cloud, stem, unit, winding_path
 from scenes.random_draws import integer, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import Part, PartedShape
 
 
 @dataclass(frozen=True)
-class Tree(Standing):
+class Tree(PartedShape):
     """A winding trunk with spreading roots, boughs, and leaves about the ends of the boughs."""
 
     height: float
@@ -91,7 +91,7 @@ class Tree(Standing):
 
 
 @dataclass(frozen=True)
-class Palm(Standing):
+class Palm(PartedShape):
     """A ringed, leaning trunk with a head of fronds."""
 
     height: float
@@ -144,7 +144,7 @@ class Palm(Standing):
 
 
 @dataclass(frozen=True)
-class Conifer(Standing):
+class Conifer(PartedShape):
     """A straight trunk with whorls of drooping, needled branches: spruce, fir."""
 
     whorls: int
@@ -199,7 +199,7 @@ class Conifer(Standing):
 
 
 @dataclass(frozen=True)
-class Bamboo(Standing):
+class Bamboo(PartedShape):
     """A clump of jointed culms with sprays of narrow leaves."""
 
     culms: int

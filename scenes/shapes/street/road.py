@@ -159,7 +159,7 @@ class Stripe:
 
 
 @dataclass(frozen=True)
-class RoadPaint(MetricShape):
+class RoadMarkings(MetricShape):
     """Lane lines, zebra bars, arrows, patches of tar: bars a few millimetres thick that follow a course."""
 
     course: Course

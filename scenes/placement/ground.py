@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from scenes.appearance.material_textures import Stuff
-from scenes.landscapes.characters import Figure
-from scenes.landscapes.terrain import Land, eye_positions
+from scenes.appearance.material_textures import TextureSampler
+from scenes.landscapes.characters import Character
+from scenes.landscapes.terrain import Land, camera_positions
 from scenes.motion.deformations.sway import Sway
 from scenes.motion.trajectories import key_times, quaternion, vector
 from scenes.random_draws import log_uniform, uniform
-from scenes.shapes.anchored import Frame, Standing
+from scenes.shapes.anchored import Frame, PartedShape
 from scenes.shapes.nature.creatures import Eyeballs, iris_repeats
 from scenes.spec import Deformation, Material, Scene, SceneObject, Shape, StereoCamera, Texture, Trajectory
 
@@ -31,7 +31,7 @@ _LARGEST_COVER = 0.45
 @lru_cache(maxsize=256)
 def frame_of(shape: Shape) -> Frame:
     """How a shape's mesh lies about its foot; a shape without one stands on its lowest point."""
-    if isinstance(shape, Standing):
+    if isinstance(shape, PartedShape):
         return shape.frame()
     vertices = shape.mesh().vertices
     low, high = vertices.min(axis=0), vertices.max(axis=0)
@@ -66,7 +66,7 @@ class Box:
         return float(np.linalg.norm(np.maximum(local - self.half, 0.0), axis=1).min())
 
 
-class Stage:
+class GroundPlacement:
     """A scene being set up: the land, the camera, and what has been placed so far."""
 
     def __init__(self, land: Land, camera: StereoCamera, frames: int, clearance_m: float) -> None:
@@ -76,7 +76,7 @@ class Stage:
         self.clearance_m = clearance_m
         """How near to either eye anything may come."""
         self.pose = camera.pose("left", (frames - 1) / 2)
-        self._eyes = eye_positions(camera, frames)
+        self._eyes = camera_positions(camera, frames)
         self._kept_free: list[tuple[float, float, float]] = []
         """Image columns (low, high, -1..1) before which nothing may stand, up to a depth in metres."""
 
@@ -93,7 +93,7 @@ class Stage:
     def wear(
         self,
         rng: np.random.Generator,
-        stuff: Stuff,
+        stuff: TextureSampler,
         unit_m: float,
         depth_m: float,
         *,
@@ -206,7 +206,7 @@ class Stage:
     def stand_in_parts(
         self,
         name: str,
-        shape: Standing,
+        shape: PartedShape,
         materials: dict[str, int],
         spot: Spot,
         scale_m: float,
@@ -275,23 +275,23 @@ class Stage:
         under = spot.ground_m + self._turn(spot, None).apply(corners * scale_m)
         return float(spot.ground_m[2] - self.land.height_m(under[:, :2]).min())
 
-    def figure(
+    def character(
         self,
         name: str,
-        figure: Figure,
+        character: Character,
         stuffs: dict[str, int],
         spot: Spot,
         scale_m: float,
         *,
         checked: bool = True,
     ) -> bool:
-        """Put a figure on the land, walking where it faces if it walks; False if it may not stand there.
+        """Put a character on the land, walking where it faces if it walks; False if it may not stand there.
 
         `stuffs` gives the material of each stuff. Its heading does not change, so that its parts, each a
         mesh with a centre of its own, stay together exactly.
         """
-        path = self._walk(figure, spot, scale_m)
-        reach = np.array((figure.reach, figure.reach, figure.height)) * scale_m
+        path = self._walk(character, spot, scale_m)
+        reach = np.array((character.reach, character.reach, character.height)) * scale_m
         for place in path:
             centre = place + np.array((0.0, 0.0, reach[2] / 2))
             half = np.array((0.6 * reach[0], 0.6 * reach[1], reach[2] / 2))
@@ -300,7 +300,7 @@ class Stage:
                 return False
         rotation = Rotation.from_euler("Z", spot.heading_rad)
         times = tuple(float(time) for time in key_times(self.frames))
-        for index, part in enumerate(figure.parts):
+        for index, part in enumerate(character.parts):
             frame = part.shape.frame()
             offset = rotation.apply(frame.centre * scale_m)
             motion = Trajectory(
@@ -314,27 +314,27 @@ class Stage:
                     self._part_material(part.shape, stuffs[part.stuff]),
                     motion,
                     (scale, scale, scale),
-                    figure.deformation(part),
+                    character.deformation(part),
                 )
             )
         return True
 
-    def _part_material(self, shape: Standing, material: int) -> int:
+    def _part_material(self, shape: PartedShape, material: int) -> int:
         """Eyes of each size need the picture laid on to that size."""
         if not isinstance(shape, Eyeballs):
             return material
         return self.material(replace(self.materials[material], repeats=iris_repeats(shape)))
 
-    def _walk(self, figure: Figure, spot: Spot, scale_m: float) -> list[NDArray[np.float64]]:
-        """Where a figure's foot point is at the key times, on the ground throughout."""
-        step = np.array((math.cos(spot.heading_rad), math.sin(spot.heading_rad))) * figure.stride * scale_m
+    def _walk(self, character: Character, spot: Spot, scale_m: float) -> list[NDArray[np.float64]]:
+        """Where a character's foot point is at the key times, on the ground throughout."""
+        step = np.array((math.cos(spot.heading_rad), math.sin(spot.heading_rad))) * character.stride * scale_m
         places = []
         for time in key_times(self.frames):
             flat = spot.ground_m[:2] + step * (time - (self.frames - 1) / 2)
             places.append(np.array((*flat, float(self.land.height_m(flat[None])[0]))))
         return places
 
-    def ground(self, rng: np.random.Generator, stuff: Stuff, sharp_m: float) -> None:
+    def ground(self, rng: np.random.Generator, stuff: TextureSampler, sharp_m: float) -> None:
         """The land itself; its texture is sharp where it is `sharp_m` away."""
         material = self.wear(rng, stuff, self.land.half_m, sharp_m, size=512)
         motion = Trajectory.static((0.0, 0.0, self.land.rest_m()))
