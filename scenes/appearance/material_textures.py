@@ -37,7 +37,9 @@ from scenes.textures.plain import Gradient
 from scenes.textures.tiles import Bricks, Dots, Stripes, Weave
 
 TextureSampler = Callable[[np.random.Generator, int], Texture]
-"""Draws a texture of `size` pixels."""
+"""Draws a texture of `size` x `size` pixels: called with a generator and the size."""
+_Pattern = Dots | Gradient | Labyrinth | Stripes | Weave
+"""Patterns whose colours may be replaced."""
 
 
 def leaves(colors: PaletteRange = FOLIAGE) -> TextureSampler:
@@ -215,8 +217,7 @@ def _noise(rng: np.random.Generator, size: int, palette: Palette, low_cycles: fl
     return replace(noise, palette=palette, low_cycles=low_cycles * uniform(rng, 0.7, 1.5))
 
 
-def _recolored(texture: Texture, palette: Palette) -> Texture:
+def _recolored(texture: _Pattern, palette: Palette) -> Texture:
     """The same pattern in other colours, as many as it had."""
-    had = len(texture.palette)  # type: ignore[attr-defined]
-    colors = tuple(palette[k % len(palette)] for k in range(had))
-    return replace(texture, palette=colors)  # type: ignore[call-arg]
+    colors = tuple(palette[k % len(palette)] for k in range(len(texture.palette)))
+    return replace(texture, palette=colors)

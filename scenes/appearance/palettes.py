@@ -1,4 +1,4 @@
-"""Palettes of named stuffs: foliage, bark, rock, sand, snow, skin, cloth."""
+"""Palettes of named substances: foliage, bark, rock, sand, snow, skin, cloth."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from scenes.random_draws import Range
 
 @dataclass(frozen=True)
 class PaletteRange:
-    """Ranges of OKLCH that a stuff's colours lie in."""
+    """The OKLCH colours that a substance may have."""
 
     hue_deg: Range
+    """As in `scenes.appearance.painting.shade`: 30 red, 100 yellow, 140 green."""
     chroma: Range
+    """0 grey .. 0.3 vivid."""
     lightness: Range
-    """Spread evenly between darkest and lightest, so that a pattern has contrast."""
+    """Perceptual, 0..1."""
 
 
 FOLIAGE = PaletteRange((100.0, 150.0), (0.07, 0.16), (0.32, 0.78))
@@ -39,12 +41,15 @@ VIVID = PaletteRange((0.0, 360.0), (0.08, 0.2), (0.4, 0.9))
 
 
 def sample_palette_in(
-    rng: np.random.Generator, colors: PaletteRange, count: int, hue_spread_deg: float = 14.0
+    rng: np.random.Generator, within: PaletteRange, count: int, hue_spread_deg: float = 14.0
 ) -> Palette:
-    """`count` colours of one stuff from dark to light, of neighbouring hues."""
-    hue = rng.uniform(*colors.hue_deg) + rng.uniform(-hue_spread_deg, hue_spread_deg, count)
-    chroma = rng.uniform(*colors.chroma) * rng.uniform(0.75, 1.2, count)
-    low, high = colors.lightness
+    """`count` colours of one substance from dark to light, their hues within `hue_spread_deg` of a common one.
+
+    Lightness is spread evenly about a random level, so that a pattern in these colours has contrast.
+    """
+    hue = rng.uniform(*within.hue_deg) + rng.uniform(-hue_spread_deg, hue_spread_deg, count)
+    chroma = rng.uniform(*within.chroma) * rng.uniform(0.75, 1.2, count)
+    low, high = within.lightness
     middle = rng.uniform(low, high)
     low, high = (low + middle) / 2, (high + middle) / 2
     lightness = np.linspace(low, high, count) + rng.normal(0.0, 0.02, count)

@@ -18,6 +18,9 @@ from scenes.appearance.lights import sample_area_light, sample_sun
 from scenes.appearance.materials import sample_material
 from scenes.family import Family, FamilyConfig
 from scenes.motion.trajectories import exposure_times, quaternion, shifted, vector, wander
+from scenes.placement.assembly import Assembly
+from scenes.placement.ground import ground_object
+from scenes.placement.view import View
 from scenes.random_draws import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.shapes import SHAPES
 from scenes.shapes.solids.organic import Terrain
@@ -129,13 +132,10 @@ class FlyingThingsConfig(FamilyConfig):
 
 
 @dataclass(frozen=True)
-class _Rig:
-    """The camera and what placing things in its view needs."""
+class _Rig(View):
+    """The view, and the depths between which things are placed in it."""
 
-    camera: StereoCamera
     config: FlyingThingsConfig
-    pose: NDArray[np.float64]
-    """Left eye to world, half way through the scene."""
 
     def depth(self, disparity_share: float) -> float:
         """Depth in metres at which the disparity is this share of the image width."""
@@ -143,31 +143,20 @@ class _Rig:
 
     @property
     def nearest_m(self) -> float:
+        """Least depth allowed."""
         return self.depth(self.config.disparity_share[1])
 
     @property
     def farthest_m(self) -> float:
+        """Depth of the farthest ground."""
         return self.depth(self.config.disparity_share[0])
-
-    @property
-    def half_view(self) -> tuple[float, float]:
-        """Tangents of half the horizontal and half the vertical field of view."""
-        focal_px = self.camera.focal_px
-        return self.camera.width / 2 / focal_px, self.camera.height / 2 / focal_px
-
-    def point(self, right: float, up: float, depth_m: float) -> NDArray[np.float64]:
-        """World point at an image position (-1..1 is the frame, seen from between the eyes) and depth."""
-        across, high = self.half_view
-        local = (right * across * depth_m + self.camera.baseline_m / 2, up * high * depth_m, -depth_m)
-        world: NDArray[np.float64] = self.pose[:3, :3] @ local + self.pose[:3, 3]
-        return world
 
 
 @dataclass(frozen=True)
 class _Land:
-    """The ground and where it lies in the world."""
+    """Rolling ground (`scenes.placement.ground.Ground`)."""
 
-    terrain: Terrain
+    shape: Terrain
     half_m: float
     """Half its side."""
     level_m: float
@@ -175,24 +164,29 @@ class _Land:
 
     def height_m(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """World z of the ground at (N, 2) world points."""
-        height: NDArray[np.float64] = self.level_m + self.half_m * self.terrain.height(points_m / self.half_m)
+        height: NDArray[np.float64] = self.level_m + self.half_m * self.shape.height(points_m / self.half_m)
         return height
+
+    def mesh_origin_m(self) -> float:
+        """World z of the origin of the mesh."""
+        return self.level_m - self.shape.middle_height() * self.half_m
 
 
 def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -> Scene:
     """Draw one scene."""
     rig = _sample_rig(rng, config)
     land = _sample_land(rng, rig)
-    materials: list[Material] = []
-    ground = _ground(rng, rig, land, materials)
-    background = _background(rng, rig, land, materials)
-    flyers = _flyers(rng, rig, land, materials)
+    scene = Assembly()
+    scene.add(_ground(rng, rig, land, scene))
+    background = _background(rng, rig, land, scene)
+    flyers = _flyers(rng, rig, land, scene)
+    scene.add(*background, *flyers)
     return Scene(
         family="flying_things",
         frames=config.frames,
         camera=rig.camera,
-        objects=(ground, *background, *flyers),
-        materials=tuple(materials),
+        objects=scene.objects,
+        materials=tuple(scene.materials),
         lights=_lights(rng, rig),
         world=World(_environment(rng, config), uniform(rng, *config.sky_strength)),
         exposure_key=uniform(rng, 0.18, 0.32),
@@ -219,7 +213,7 @@ def _sample_rig(rng: np.random.Generator, config: FlyingThingsConfig) -> _Rig:
         reach_deg=4.0,
     )
     camera = StereoCamera(config.width, config.height, focal_mm, baseline_m, motion)
-    return _Rig(camera, config, camera.pose("left", (config.frames - 1) / 2))
+    return _Rig(camera, config.frames, config)
 
 
 def _final(rng: np.random.Generator, rig: _Rig) -> FinalPass:
@@ -255,18 +249,15 @@ def _sample_land(rng: np.random.Generator, rig: _Rig) -> _Land:
     return _Land(terrain, half_m, -below_m)
 
 
-def _ground(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]) -> SceneObject:
+def _ground(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -> SceneObject:
     # Its texture is sharp where the ground is at a few times the nearest depth.
     unit_px = land.half_m * rig.camera.focal_px / (3 * rig.nearest_m)
-    materials.append(sample_material(rng, unit_px, 512))
-    motion = Trajectory.static((0.0, 0.0, land.level_m - land.terrain.middle_height() * land.half_m))
-    scale = (land.half_m, land.half_m, land.half_m)
-    return SceneObject("ground", land.terrain, len(materials) - 1, motion, scale)
+    return ground_object(land, scene.material(sample_material(rng, unit_px, 512)))
 
 
-_STANDING: dict[str, float] = {"Box": 0.3, "DeformedCylinder": 0.2, "Cylinder": 0.08}
+_BACKGROUND_SHAPES: dict[str, float] = {"Box": 0.3, "DeformedCylinder": 0.2, "Cylinder": 0.08}
 """Shares of the background's plain kinds; the rest is of any kind."""
-_PLAIN: dict[str, float] = {"Box": 0.4, "Cylinder": 0.3, "Superquadric": 0.3}
+_PLAIN_SHAPES: dict[str, float] = {"Box": 0.4, "Cylinder": 0.3, "Superquadric": 0.3}
 """What all flying objects are at complexity 0, fewer and fewer up to 1."""
 
 
@@ -281,13 +272,10 @@ def _sample_shape(rng: np.random.Generator, plain: dict[str, float] | None = Non
     return choose(rng, kinds, [kind.popularity for kind in kinds]).sample(rng)
 
 
-def _background(
-    rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]
-) -> list[SceneObject]:
+def _background(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -> list[SceneObject]:
     """Objects standing or lying on the ground in view, near ones small, far ones up to skyline size."""
-    first = len(materials)
     kinds = rig.config.count(rng, rig.config.background_materials)
-    materials.extend(sample_material(rng, 0.08 * rig.camera.width) for _ in range(kinds))
+    materials = [scene.material(sample_material(rng, 0.08 * rig.camera.width)) for _ in range(kinds)]
     count = rig.config.count(rng, rig.config.background_objects)
     depths_m = [rig.depth(uniform(rng, *rig.config.background_disparity_share)) for _ in range(count)]
     spots = np.array([rig.point(uniform(rng, -1.25, 1.25), 0.0, depth_m) for depth_m in depths_m])
@@ -302,8 +290,8 @@ def _background(
         things.append(
             SceneObject(
                 name=f"background {index}",
-                shape=_sample_shape(rng, _STANDING),
-                material=integer(rng, first, len(materials) - 1),
+                shape=_sample_shape(rng, _BACKGROUND_SHAPES),
+                material=choose(rng, materials),
                 motion=Trajectory.static(vector(spot + sunk), quaternion(turn)),
                 scale_m=vector(size_m * rng.uniform(0.75, 1.25, 3)),
             )
@@ -311,7 +299,7 @@ def _background(
     return things
 
 
-def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]) -> list[SceneObject]:
+def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -> list[SceneObject]:
     count = rig.config.count(rng, rig.config.flying_objects)
     # `count` objects of this cover each leave 1 - flying_cover of the image free, if placed independently.
     each = 1 - (1 - uniform(rng, *rig.config.flying_cover)) ** (1 / max(count, 1))
@@ -319,8 +307,8 @@ def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Ma
     for index in range(count):
         cover = min(each * math.exp(rng.normal(-0.1, 0.5)), 0.12)
         size_px = math.sqrt(cover * rig.camera.width * rig.camera.height / _SHAPE_FILL)
-        materials.append(_flyer_material(rng, rig.config, size_px))
-        flyers.append(_flyer(rng, rig, f"flying {index}", len(materials) - 1, size_px, land.level_m))
+        material = scene.material(_flyer_material(rng, rig.config, size_px))
+        flyers.append(_flyer(rng, rig, f"flying {index}", material, size_px, land.level_m))
     return flyers
 
 
@@ -341,7 +329,9 @@ def _flyer(
 ) -> SceneObject:
     """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth."""
     config = rig.config
-    shape = _sample_shape(rng, {name: share * (1 - config.complexity) for name, share in _PLAIN.items()})
+    shape = _sample_shape(
+        rng, {name: share * (1 - config.complexity) for name, share in _PLAIN_SHAPES.items()}
+    )
     if own := config.draw_user_asset(rng, config.assets.meshes):
         shape = UserMesh(own.sha256)
     stretch = rng.uniform(0.8, 1.25, 3)
@@ -373,9 +363,9 @@ def _kept_away(motion: Trajectory, reach_m: float, rig: _Rig) -> Trajectory:
     forward = -rig.pose[:3, 2]
     shortfall = -math.inf
     for time in exposure_times(rig.config.frames):
-        eye = rig.camera.pose("left", time)
-        depth_m = float((motion.pose(time)[:3, 3] - eye[:3, 3]) @ -eye[:3, 2])
-        shortfall = max(shortfall, (rig.nearest_m + reach_m - depth_m) / float(forward @ -eye[:3, 2]))
+        camera = rig.camera.pose("left", time)
+        depth_m = float((motion.pose(time)[:3, 3] - camera[:3, 3]) @ -camera[:3, 2])
+        shortfall = max(shortfall, (rig.nearest_m + reach_m - depth_m) / float(forward @ -camera[:3, 2]))
     return motion if shortfall <= 0 else shifted(motion, forward * shortfall * 1.001)
 
 

@@ -16,7 +16,7 @@ from scenes.appearance.lights import sample_area_light, sample_light_color, samp
 from scenes.appearance.material_textures import TextureSampler, eye, fur, ground, hide, horn, leaves, rock
 from scenes.appearance.palettes import DRY_GRASS, EARTH, FOLIAGE, MOSS, ROCK, VIVID
 from scenes.family import Family
-from scenes.landscapes.characters import Character, Coat, sample_creature
+from scenes.landscapes.characters import Character, Coat, place_character, sample_creature
 from scenes.landscapes.terrain import (
     Land,
     LandscapeConfig,
@@ -37,7 +37,7 @@ from scenes.landscapes.vegetation import (
     undergrowth,
 )
 from scenes.motion.trajectories import vector
-from scenes.placement.ground import GroundPlacement, Spot
+from scenes.placement.ground import GroundPlacement, Spot, sway_of
 from scenes.random_draws import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.shapes.nature.landforms import Cavern, Dripstone, Landscape
 from scenes.shapes.nature.plants import Bush, Vine
@@ -92,7 +92,7 @@ def sample_monkaa(rng: np.random.Generator, config: MonkaaConfig) -> Scene:
     plan = _sample_plan(rng, config)
     placement = plan.placement
     sky = Sky.sample(rng, 1024)
-    placement.ground(rng, _floor(plan.place), 1.5 * plan.depth_m)
+    placement.lay_ground(rng, _floor(plan.place), 1.5 * plan.depth_m)
     cave = _cave(rng, plan) if plan.place == "cave" else None
     creatures = _creatures(rng, config, plan)
     area = VegetationArea(placement, plan.depth_m, anywhere if cave is None else cave.holds)
@@ -106,7 +106,7 @@ def sample_monkaa(rng: np.random.Generator, config: MonkaaConfig) -> Scene:
     base = Scene(
         family="monkaa",
         frames=config.frames,
-        camera=placement.camera,
+        camera=placement.view.camera,
         objects=(),
         materials=(),
         lights=_lights(rng, config, plan, cave),
@@ -177,14 +177,16 @@ def _creatures(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> i
             spot = placement.spot(
                 uniform(rng, -0.85, 0.85), plan.depth_m * uniform(rng, 0.85, 2.6), _towards_camera(rng, 2.2)
             )
-        stuffs = _creature_materials(rng, placement, character, fur if furry else hide, scale_m, spot.depth_m)
+        materials = _creature_materials(
+            rng, placement, character, fur if furry else hide, scale_m, spot.depth_m
+        )
         # The one the scene is about stands where it must: the camera was set up for it.
-        placed += placement.character(
-            f"creature {index}", character, stuffs, spot, scale_m, checked=index > 0
+        placed += place_character(
+            placement, f"creature {index}", character, materials, spot, scale_m, checked=index > 0
         )
         if index == 0:
-            wide = character.reach * scale_m / (plan.depth_m * placement.half_view[0])
-            placement.keep_free(right, 0.7 * wide, plan.depth_m)
+            wide = character.reach * scale_m / (plan.depth_m * placement.view.half_view[0])
+            placement.keep_view_free(right, 0.7 * wide, plan.depth_m)
     return placed
 
 
@@ -203,11 +205,11 @@ def _creature_materials(
     half_m = 0.5 * scale_m
     gloss = 0.0 if coat is fur or chance(rng, 0.5) else 0.4
     worn = {
-        "fur": placement.wear(rng, coat, half_m, depth_m, gloss=gloss),
-        "eye": placement.wear(rng, eye, half_m, depth_m, size=128, gloss=0.5),
+        "fur": placement.new_material(rng, coat, half_m, depth_m, gloss=gloss),
+        "eye": placement.new_material(rng, eye, half_m, depth_m, size=128, gloss=0.5),
     }
-    if any(part.stuff == "horn" for part in character.parts):
-        worn["horn"] = placement.wear(rng, horn, 0.2 * half_m, depth_m, size=128)
+    if any(part.material == "horn" for part in character.parts):
+        worn["horn"] = placement.new_material(rng, horn, 0.2 * half_m, depth_m, size=128)
     return worn
 
 
@@ -242,10 +244,10 @@ def _grove(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
 def _cave_inside(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
     """Dripstones from floor and roof, glowing mushrooms."""
     placement, d = plan.placement, plan.depth_m
-    stone = placement.wear(rng, rock(), 0.4 * d, 1.5 * d)
+    stone = placement.new_material(rng, rock(), 0.4 * d, 1.5 * d)
     shapes = [Dripstone.sample(rng) for _ in range(4)]
     for index in range(2 * integer(rng, *config.trees)):
-        spot = placement.scatter(rng, (0.8 * d, 4.5 * d), 1.1)
+        spot = placement.random_spot(rng, (0.8 * d, 4.5 * d), 1.1)
         shape, scale_m = choose(rng, shapes), log_uniform(rng, 0.15, 0.8) * d
         if index % 2:
             placement.stand(f"stalagmite {index}", shape, stone, spot, scale_m, sunk_m=0.05 * scale_m)
@@ -291,7 +293,9 @@ def _cave(rng: np.random.Generator, plan: _Plan) -> _Tunnel:
         rings=64,
         seed=new_seed(rng),
     )
-    stone = placement.wear(rng, rock(ROCK, choose(rng, (MOSS, EARTH))), 3.0 * radius_m, 1.6 * d, size=512)
+    stone = placement.new_material(
+        rng, rock(ROCK, choose(rng, (MOSS, EARTH))), 3.0 * radius_m, 1.6 * d, size=512
+    )
     spot = Spot(np.array((0.0, start_m, 0.0)), 1.6 * d)
     placement.stand("cave", shape, stone, spot, radius_m, sunk_m=-0.3 * radius_m, checked=False)
     return _Tunnel(radius_m, start_m + shape.length * radius_m, shape.bend * radius_m)
@@ -321,15 +325,15 @@ def _vines(rng: np.random.Generator, plan: _Plan, count: int) -> None:
     """Cords that come down from above the image."""
     placement, d = plan.placement, plan.depth_m
     shapes = [Vine.sample(rng) for _ in range(3)]
-    green = [placement.wear(rng, leaves(), 0.5 * d, 1.2 * d) for _ in range(2)]
+    green = [placement.new_material(rng, leaves(), 0.5 * d, 1.2 * d) for _ in range(2)]
     for index in range(count):
-        spot = placement.scatter(rng, (0.8 * d, 2.5 * d), 1.0)
+        spot = placement.random_spot(rng, (0.8 * d, 2.5 * d), 1.0)
         # The slope of the image's upper edge, with some margin for the camera's motion.
-        edge = -placement.pose[2, 2] + (placement.half_view[1] + 0.12) * placement.pose[2, 1]
+        edge = -placement.pose[2, 2] + (placement.view.half_view[1] + 0.12) * placement.pose[2, 1]
         top_m = placement.pose[2, 3] + edge * spot.depth_m - spot.ground_m[2]
         scale_m = min(log_uniform(rng, 0.4, 1.2) * d, 0.8 * top_m)
         shape = choose(rng, shapes)
-        sway = placement.swaying(rng, shape, uniform(rng, 0.02, 0.08))
+        sway = sway_of(rng, shape, uniform(rng, 0.02, 0.08))
         if scale_m > 0:
             placement.hang(f"vine {index}", shape, choose(rng, green), spot, top_m, scale_m, deformation=sway)
 

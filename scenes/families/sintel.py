@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.appearance.lights import sample_area_light, sample_sun
@@ -33,7 +32,7 @@ from scenes.appearance.material_textures import (
 )
 from scenes.appearance.palettes import DRY_GRASS, EARTH, HEATH, MOSS, RED_ROCK, ROCK, SAND, SNOW
 from scenes.family import Family
-from scenes.landscapes.characters import Character, Coat, sample_creature
+from scenes.landscapes.characters import Character, Coat, place_character, sample_creature
 from scenes.landscapes.people import sample_person, statue
 from scenes.landscapes.terrain import (
     Land,
@@ -129,7 +128,7 @@ def sample_sintel(rng: np.random.Generator, config: SintelConfig) -> Scene:
     plan = _sample_plan(rng, config)
     placement, depth_m = plan.placement, plan.depth_m
     sky = Sky.sample(rng, 1024)
-    placement.ground(rng, plan.place.floor, 1.5 * depth_m)
+    placement.lay_ground(rng, plan.place.floor, 1.5 * depth_m)
     people = _people(rng, config, plan)
     plan.place.furnish(rng, config, plan)
     stones = (plan.place.stones, plan.place.stones)
@@ -140,7 +139,7 @@ def sample_sintel(rng: np.random.Generator, config: SintelConfig) -> Scene:
     base = Scene(
         family="sintel",
         frames=config.frames,
-        camera=placement.camera,
+        camera=placement.view.camera,
         objects=(),
         materials=(),
         lights=_lights(rng, config, plan),
@@ -195,7 +194,7 @@ def _people(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> int:
             spot = placement.spot(uniform(rng, -0.9, 0.9), d * log_uniform(rng, 0.9, 3.5), heading)
         placed += _dressed(rng, placement, f"person {index}", character, spot, scale_m, checked=index > 0)
         if index == 0:
-            placement.keep_free(right, 0.5 * scale_m / (d * placement.half_view[0]), d)
+            placement.keep_view_free(right, 0.5 * scale_m / (d * placement.view.half_view[0]), d)
     if chance(rng, config.beast_share):
         character = sample_creature(rng, Coat(integer(rng, 0, 1500), 0.03, 48))
         spot = placement.spot(uniform(rng, -0.9, 0.9), d * log_uniform(rng, 1.0, 2.5), uniform(rng, 0.0, 6.3))
@@ -213,20 +212,20 @@ def _dressed(
     *,
     checked: bool,
 ) -> bool:
-    """Put a character on the placement in materials of its own."""
-    stuffs = {part.stuff for part in character.parts}
+    """Put a character on the ground in materials of its own."""
+    names = {part.material for part in character.parts}
     worn = {
-        stuff: placement.wear(
+        material: placement.new_material(
             rng,
-            CHARACTER_TEXTURES[stuff],
-            (0.5 if stuff in ("cloth", "fur") else 0.2) * scale_m,
+            CHARACTER_TEXTURES[material],
+            (0.5 if material in ("cloth", "fur") else 0.2) * scale_m,
             spot.depth_m,
-            size=256 if stuff in ("cloth", "fur") else 128,
-            gloss=0.5 if stuff == "eye" else 0.0,
+            size=256 if material in ("cloth", "fur") else 128,
+            gloss=0.5 if material == "eye" else 0.0,
         )
-        for stuff in sorted(stuffs)
+        for material in sorted(names)
     }
-    return placement.character(name, character, worn, spot, scale_m, checked=checked)
+    return place_character(placement, name, character, worn, spot, scale_m, checked=checked)
 
 
 def _mountain(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
@@ -301,8 +300,8 @@ def _town(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
     """Houses along both sides of a street that leads away from the camera, a wall or tower at its end."""
     placement, d = plan.placement, plan.depth_m
     houses = [House.sample(rng) for _ in range(4)]
-    walls = [placement.wear(rng, plaster, 4.0, 2 * d, size=512) for _ in range(4)]
-    roofs = [placement.wear(rng, roofing, 3.0, 2 * d) for _ in range(3)]
+    walls = [placement.new_material(rng, plaster, 4.0, 2 * d, size=512) for _ in range(4)]
+    roofs = [placement.new_material(rng, roofing, 3.0, 2 * d) for _ in range(3)]
     half_street_m = uniform(rng, 2.2, 4.5)
     for side in (-1, 1):
         along_m = uniform(rng, 0.2, 0.8) * d
@@ -314,7 +313,7 @@ def _town(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
             centre = np.array(
                 (side * (half_street_m + across / 2 + uniform(rng, 0.0, 1.0)), along_m + extent / 2)
             )
-            spot = _spot_at(placement, centre, facing + float(rng.normal(0.0, 0.06)))
+            spot = placement.spot_at(centre, facing + float(rng.normal(0.0, 0.06)))
             worn = {"walls": choose(rng, walls), "roof": choose(rng, roofs)}
             placement.stand_in_parts(f"house {side} {index}", shape, worn, spot, width_m, on_lowest=True)
             along_m += extent * uniform(rng, 1.05, 1.5)
@@ -322,13 +321,6 @@ def _town(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
     if chance(rng, 0.6):
         kinds = [replace(Tree.sample(rng), leaves=300)]
         trees(rng, plan.area, kinds, integer(rng, 2, 5), (1.3, 8.0), (0.2, 0.35), [leaves(HEATH)])
-
-
-def _spot_at(placement: GroundPlacement, flat_m: NDArray[np.float64], heading_rad: float) -> Spot:
-    height = float(placement.land.height_m(flat_m[None])[0])
-    place = np.array((*flat_m, height))
-    depth = float((placement.pose[:3, 3] - place) @ placement.pose[:3, 2])
-    return Spot(place, depth, heading_rad)
 
 
 def _conifers(
@@ -354,11 +346,11 @@ def _ruined(
 ) -> None:
     """Walls, towers, arches, steps, columns and a statue, here and there; `ruin` scales their decay."""
     placement, d = plan.placement, plan.depth_m
-    worn = [placement.wear(rng, stone, 2.0, 1.8 * d, size=512) for _ in range(2)]
-    hewn = placement.wear(rng, plan.place.stones, 2.0, 1.3 * d, size=512)
+    worn = [placement.new_material(rng, stone, 2.0, 1.8 * d, size=512) for _ in range(2)]
+    hewn = placement.new_material(rng, plan.place.stones, 2.0, 1.3 * d, size=512)
     for index in range(count):
         kind = choose(rng, (BlockWall, Archway, Steps, Column, "statue"), (0.3, 0.25, 0.12, 0.2, 0.13))
-        spot = placement.scatter(rng, (1.1 * d, 7.0 * d), 1.1)
+        spot = placement.random_spot(rng, (1.1 * d, 7.0 * d), 1.1)
         material = choose(rng, worn)
         name = f"ruin {index}"
         if kind is Archway:
@@ -401,7 +393,7 @@ def _statue(
     character = statue(rng, sample_person(rng, 40))
     body = replace(facing, ground_m=facing.ground_m + np.array((0.0, 0.0, 0.98 * block_m)))
     upright = replace(facing, heading_rad=facing.heading_rad + math.pi / 2)
-    box = placement.box_of(character, body, scale_m, 0.0, None)
+    box = placement.box_of(character, body, scale_m)
     if placement.allows(box) and placement.stand(f"{name} plinth", plinth, material, upright, block_m):
         placement.stand(f"{name} statue", character, material, body, scale_m, checked=False)
 
@@ -409,7 +401,7 @@ def _statue(
 def _colonnade(rng: np.random.Generator, plan: _Plan, stone: TextureSampler) -> None:
     """Two rows of columns of one kind, some broken, that lead away from the camera or across the view."""
     placement, d = plan.placement, plan.depth_m
-    material = placement.wear(rng, stone, 2.0, 1.5 * d)
+    material = placement.new_material(rng, stone, 2.0, 1.5 * d)
     whole = replace(Column.sample(rng), broken=0.0)
     kinds = [whole, *(replace(whole, broken=uniform(rng, 0.2, 0.8), seed=new_seed(rng)) for _ in range(3))]
     height_m, gap_m, row_m = uniform(rng, 3.5, 7.0), uniform(rng, 2.0, 3.5), uniform(rng, 2.5, 5.0)
@@ -417,7 +409,7 @@ def _colonnade(rng: np.random.Generator, plan: _Plan, stone: TextureSampler) -> 
     origin = np.array((uniform(rng, -1.0, 1.0), uniform(rng, 0.9, 1.6) * d))
     for index in range(integer(rng, 8, 16)):
         flat = origin + turn @ np.array(((index % 2 - 0.5) * 2 * row_m, index // 2 * gap_m))
-        spot = _spot_at(placement, flat, 0.0)
+        spot = placement.spot_at(flat, 0.0)
         placement.stand(
             f"column {index}",
             choose(rng, kinds),

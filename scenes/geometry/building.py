@@ -17,6 +17,8 @@ from scenes.geometry.mesh import Mesh
 
 Vertices = NDArray[np.float64]
 Triangles = NDArray[np.int64]
+Part = tuple[Vertices, Triangles]
+"""A surface: its vertices (V, 3) and its triangles (F, 3)."""
 
 _MIN_DOUBLE_AREA = 1e-12
 """Triangles of less than half this area (local units squared) have no direction worth keeping."""

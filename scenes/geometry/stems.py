@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import Vertices, tube
+from scenes.geometry.building import Part, Vertices, tube
 from scenes.geometry.leaves import arched, horizontal_side, strips
-from scenes.shapes.anchored import Part
 
 UP = np.array((0.0, 0.0, 1.0))
 

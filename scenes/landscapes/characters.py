@@ -7,14 +7,20 @@ body height.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from scenes.motion.deformations.articulated import Articulated, Joint
+from scenes.motion.trajectories import key_times
+from scenes.placement.assembly import anchored_object
+from scenes.placement.boxes import OrientedBox
+from scenes.placement.ground import GroundPlacement, Spot
 from scenes.random_draws import chance, choose, integer, new_seed, uniform
 from scenes.shapes.anchored import PartedShape
-from scenes.shapes.nature.creatures import Eyeballs, Limb, SoftBody
+from scenes.shapes.nature.creatures import Eyeballs, Limb, SoftBody, iris_repeats
 from scenes.spec import Vector
 
 SKINNED = -1
@@ -26,8 +32,8 @@ class CharacterPart:
     """One mesh of a character."""
 
     shape: PartedShape
-    stuff: str
-    """What it is made of: fur, skin, cloth, hair, horn, eye, leather, wood."""
+    material: str
+    """Name of what it is made of: fur, skin, cloth, hair, horn, eye, leather or wood."""
     carried_by: int = SKINNED
     """Joint it follows rigidly, or `SKINNED`."""
 
@@ -49,7 +55,7 @@ class Character:
 
     def deformation(self, part: CharacterPart) -> Articulated:
         """The motion of one of its parts, in that part's mesh coordinates."""
-        frame = part.shape.frame()
+        frame = part.shape.frame
         x, y, z = (float(value) for value in frame.centre)
         return Articulated(
             joints=self.joints,
@@ -391,3 +397,66 @@ def assemble_character(
         height=max(end[2] + radius for end, radius in ends) + fringe,
         reach=1.25 * max(math.hypot(*end) + radius for end, radius in ends) + fringe,
     )
+
+
+def place_character(
+    placement: GroundPlacement,
+    name: str,
+    character: Character,
+    materials: dict[str, int],
+    spot: Spot,
+    unit_m: float,
+    *,
+    checked: bool = True,
+) -> bool:
+    """Put a character on the ground; False if it may not stand there.
+
+    `materials` gives the material index of each `CharacterPart.material`; a body unit is `unit_m` long. A
+    character that walks does so in the direction of its heading, which does not change: so its parts, each a
+    mesh with a centre of its own, stay together exactly.
+    """
+    path = _walk(placement, character, spot, unit_m)
+    reach_m, height_m = character.reach * unit_m, character.height * unit_m
+    half = np.array((0.6 * reach_m, 0.6 * reach_m, height_m / 2))
+    for place in path if checked else ():
+        centre = place + np.array((0.0, 0.0, height_m / 2))
+        if not placement.allows(OrientedBox(centre, half, np.eye(3))):
+            return False
+    rotation = Rotation.from_euler("Z", spot.heading_rad)
+    times = tuple(float(time) for time in key_times(placement.frames))
+    placement.add(
+        *(
+            anchored_object(
+                f"{name} {part.material} {index}",
+                part.shape,
+                _part_material(placement, part.shape, materials[part.material]),
+                path,
+                (rotation,) * len(times),
+                times,
+                unit_m=unit_m,
+                deformation=character.deformation(part),
+            )
+            for index, part in enumerate(character.parts)
+        )
+    )
+    return True
+
+
+def _part_material(placement: GroundPlacement, shape: PartedShape, material: int) -> int:
+    """Eyeballs of each size need their texture scaled to it."""
+    if not isinstance(shape, Eyeballs):
+        return material
+    return placement.material(replace(placement.materials[material], repeats=iris_repeats(shape)))
+
+
+def _walk(
+    placement: GroundPlacement, character: Character, spot: Spot, unit_m: float
+) -> list[NDArray[np.float64]]:
+    """(3,) world points of a character's anchor at the key times, on the ground throughout."""
+    heading = np.array((math.cos(spot.heading_rad), math.sin(spot.heading_rad)))
+    step = heading * character.stride * unit_m
+    places = []
+    for time in key_times(placement.frames):
+        plan = spot.ground_m[:2] + step * (time - (placement.frames - 1) / 2)
+        places.append(np.array((*plan, float(placement.ground.height_m(plan[None])[0]))))
+    return places

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.family import FamilyConfig
-from scenes.motion.trajectories import KEY_SPACING_FRAMES, exposure_times, vector, wander
+from scenes.motion.trajectories import KEY_SPACING_FRAMES, vector, wander
 from scenes.random_draws import Range, chance, log_uniform, uniform
 from scenes.shapes.nature.landforms import Landscape
 from scenes.spec import Color, FinalPass, Fog, StereoCamera
@@ -51,7 +51,7 @@ class LandscapeConfig(FamilyConfig):
 
 @dataclass(frozen=True)
 class Land:
-    """The ground and how large it is; its middle is the world's origin."""
+    """The ground of a landscape (`scenes.placement.ground.Ground`); its middle is the world's origin."""
 
     shape: Landscape
     half_m: float
@@ -78,8 +78,8 @@ class Land:
         )
         return height
 
-    def rest_m(self) -> float:
-        """World z of the mesh's origin."""
+    def mesh_origin_m(self) -> float:
+        """World z of the origin of the mesh."""
         return -self.shape.middle_height() * self.half_m
 
 
@@ -136,13 +136,6 @@ def sample_camera(
         reach_deg=3.0,
     )
     return StereoCamera(width, height, focus.focal_mm, baseline_m, motion)
-
-
-def camera_positions(camera: StereoCamera, frames: int) -> NDArray[np.float64]:
-    """(N, 3) where both eyes are while the scene lasts."""
-    return np.array(
-        [camera.pose(eye, time)[:3, 3] for time in exposure_times(frames) for eye in ("left", "right")]
-    )
 
 
 def half_height(focal_mm: float, config: FamilyConfig) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from scenes.appearance.material_textures import TextureSampler, bark, cap, horn, leaves
 from scenes.appearance.palettes import FOLIAGE, PaletteRange
-from scenes.placement.ground import GroundPlacement, Spot
+from scenes.placement.ground import GroundPlacement, Spot, sway_of
 from scenes.random_draws import Range, choose, log_uniform, uniform
 from scenes.shapes.anchored import PartedShape
 from scenes.shapes.nature.landforms import Boulder
@@ -44,7 +44,8 @@ class VegetationArea:
         """Up to `count` random spots at depths in units."""
         near, far = depths
         drawn = [
-            self.placement.scatter(rng, (near * self.unit_m, far * self.unit_m), spread) for _ in range(count)
+            self.placement.random_spot(rng, (near * self.unit_m, far * self.unit_m), spread)
+            for _ in range(count)
         ]
         return [spot for spot in drawn if self.holds(spot)]
 
@@ -73,8 +74,8 @@ def trees(
     """Trees of a few kinds; wood and leaves wear their own stuffs."""
     placement, unit_m = area.placement, area.unit_m
     seen_m = 1.6 * depths[0] * unit_m
-    wood = [placement.wear(rng, trunk, unit_m, seen_m) for _ in range(2)]
-    green = [placement.wear(rng, stuff, unit_m, seen_m) for stuff in foliage]
+    wood = [placement.new_material(rng, trunk, unit_m, seen_m) for _ in range(2)]
+    green = [placement.new_material(rng, sampler, unit_m, seen_m) for sampler in foliage]
     outfits = [(kind, leaf, choose(rng, wood)) for kind, leaf in _outfits(rng, kinds, green)]
     for index, spot in enumerate(area.spots(rng, count, depths, 1.2)):
         kind, leaf, stem = choose(rng, outfits)
@@ -99,12 +100,12 @@ def plants(
     """Swaying plants of a few kinds; `sunk` is how deep they stand, relative to their scale."""
     placement, unit_m = area.placement, area.unit_m
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
-    green = [placement.wear(rng, stuff, middle_m, 1.4 * depths[0] * unit_m) for stuff in foliage]
+    green = [placement.new_material(rng, sampler, middle_m, 1.4 * depths[0] * unit_m) for sampler in foliage]
     outfits = _outfits(rng, kinds, green)
     for index, spot in enumerate(area.spots(rng, count, depths, spread)):
         (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
         moves = spot.depth_m < STILL_BEYOND * unit_m
-        motion = placement.swaying(rng, shape, uniform(rng, *sway)) if moves else None
+        motion = sway_of(rng, shape, uniform(rng, *sway)) if moves else None
         placement.stand(
             f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk * scale_m, deformation=motion
         )
@@ -160,8 +161,8 @@ def mushrooms(
     placement, unit_m = area.placement, area.unit_m
     kinds = [Mushroom.sample(rng) for _ in range(5)]
     middle_m, seen_m = math.sqrt(scales[0] * scales[1]) * unit_m, 1.5 * depths[0] * unit_m
-    pale = placement.wear(rng, horn, middle_m, seen_m)
-    caps = [placement.wear(rng, cap, middle_m, seen_m, emission=glow) for _ in range(3)]
+    pale = placement.new_material(rng, horn, middle_m, seen_m)
+    caps = [placement.new_material(rng, cap, middle_m, seen_m, emission=glow) for _ in range(3)]
     outfits = _outfits(rng, kinds, caps)
     for index, spot in enumerate(area.spots(rng, count, depths, 1.1)):
         kind, top = choose(rng, outfits)
@@ -183,7 +184,7 @@ def boulders(
     placement, unit_m = area.placement, area.unit_m
     kinds = [replace(Boulder.sample(rng), detail=3) for _ in range(4)]
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
-    worn = [placement.wear(rng, stuff, middle_m, 1.8 * depths[0] * unit_m) for stuff in stones]
+    worn = [placement.new_material(rng, sampler, middle_m, 1.8 * depths[0] * unit_m) for sampler in stones]
     outfits = _outfits(rng, kinds, worn)
     for index, spot in enumerate(area.spots(rng, count, depths, 1.15)):
         (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m

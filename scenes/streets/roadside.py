@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.placement.assembly import Assembly, by_the_street
+from scenes.appearance import street_materials
+from scenes.placement.assembly import Assembly, anchored_object
 from scenes.random_draws import chance, choose, integer, uniform
-from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.anchored import MetricShape
 from scenes.shapes.street.furniture import (
     Bench,
     Bollard,
@@ -27,7 +28,7 @@ from scenes.shapes.street.furniture import (
 from scenes.shapes.street.pedestrians import PersonDesign, PersonHair, PersonLegs, PersonSkin, PersonTop
 from scenes.shapes.street.roadside_plants import TreeCrown, TreeDesign, TreeStem
 from scenes.spec import AreaLight
-from scenes.streets import materials as finishes
+from scenes.streets.along_course import on_course
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive
@@ -81,9 +82,9 @@ def add_lamps(
 ) -> list[AreaLight]:
     """Rows of lamp posts of one design; returns the light of those nearest to the rig when they are lit."""
     design = LampDesign.sample(rng)
-    post = scene.material(finishes.metal_paint(rng))
+    post = scene.material(street_materials.metal_paint(rng))
     glow = uniform(rng, 12.0, 30.0) if lit else 0.0
-    glass = scene.material(finishes.lamp((255, 226, 190) if lit else (225, 226, 220), glow))
+    glass = scene.material(street_materials.lamp((255, 226, 190) if lit else (225, 226, 220), glow))
     parts: _Parts = [("post", LampPost(design), post), ("light", LampLight(design), glass)]
     spacing = uniform(rng, *config.lamp_spacing_m)
     rows = pavements if chance(rng, 0.6) else (choose(rng, pavements),)
@@ -96,7 +97,7 @@ def add_lamps(
             # The arm's x axis points over the street.
             turn = -90.0 if pavement.side.sign > 0 else 90.0
             scene.add(
-                *by_the_street(
+                *on_course(
                     pavement.name("lamp", number), parts, drive.course, s, t, turn_deg=turn, z_m=ground_m
                 )
             )
@@ -133,7 +134,7 @@ def add_trees(
     ground_m: float,
 ) -> None:
     """A row of trees on the pavement, some in front gardens, in parks several rows."""
-    leaves, bark = scene.material(finishes.foliage(rng)), scene.material(finishes.bark(rng))
+    leaves, bark = scene.material(street_materials.foliage(rng)), scene.material(street_materials.bark(rng))
     kinds = [_tree_parts(TreeDesign.sample(rng), leaves, bark) for _ in range(2)]
     park = not pavement.side.district.houses
     depth = pavement.side.front_m - pavement.side.edge_m
@@ -154,7 +155,7 @@ def add_trees(
             name, turn = pavement.name(f"tree {row}", number), uniform(rng, 0.0, 360.0)
             if pavement.free(at, t, 0.7):
                 parts = far if at > _FINE_M else near
-                scene.add(*by_the_street(name, parts, drive.course, at, t, turn_deg=turn, z_m=ground_m))
+                scene.add(*on_course(name, parts, drive.course, at, t, turn_deg=turn, z_m=ground_m))
             s += spacing
             number += 1
 
@@ -210,11 +211,14 @@ def add_furniture(
             at = s + k * piece.row_m
             name = pavement.name(piece.name, number) + (f".{k}" if piece.row_m else "")
             if pavement.free(at, t, piece.reach_m):
-                scene.add(*by_the_street(name, piece.parts, course, at, t, turn_deg=turn, z_m=ground_m))
+                scene.add(*on_course(name, piece.parts, course, at, t, turn_deg=turn, z_m=ground_m))
 
 
 def _sample_pieces(rng: np.random.Generator, scene: Assembly, pavement: Pavement) -> list[_Piece]:
-    grey, wooden = scene.material(finishes.metal_paint(rng)), scene.material(finishes.wood(rng))
+    grey, wooden = (
+        scene.material(street_materials.metal_paint(rng)),
+        scene.material(street_materials.wood(rng)),
+    )
     facing = pavement.side.turn_deg() + 180.0
     pieces = [
         _Piece("bollard", 0.2, [("", Bollard.sample(rng), grey)], 0.2, from_kerb_m=0.4, row_m=1.5),
@@ -226,7 +230,7 @@ def _sample_pieces(rng: np.random.Generator, scene: Assembly, pavement: Pavement
     ]
     for _ in range(3):
         post = SignPost.sample(rng)
-        face = scene.material(finishes.sign_face(rng, post.corners))
+        face = scene.material(street_materials.sign_face(rng, post.corners))
         parts: _Parts = [("post", post, grey), ("face", SignFace(post), face)]
         pieces.append(_Piece("sign", 0.12, parts, 0.4, from_kerb_m=0.5, turn_deg=180.0))
     if pavement.width_m > 2.6:
@@ -247,9 +251,9 @@ def add_traffic_lights(
     if not crossings or chance(rng, 0.5):
         return
     light = TrafficLight.sample(rng)
-    post = scene.material(finishes.black_plastic())
+    post = scene.material(street_materials.black_plastic())
     green = chance(rng, 0.5)
-    lens = scene.material(finishes.lamp((40, 230, 120) if green else (250, 30, 24), 2.5))
+    lens = scene.material(street_materials.lamp((40, 230, 120) if green else (250, 30, 24), 2.5))
     parts: _Parts = [
         ("post", light, post),
         ("lens", TrafficLightLens(light, green), lens),
@@ -267,7 +271,7 @@ def add_traffic_lights(
             if over < 0 and light.reach:
                 continue
             scene.add(
-                *by_the_street(
+                *on_course(
                     pavement.name("traffic light", number),
                     parts,
                     drive.course,
@@ -310,7 +314,10 @@ def add_people(
         turns = [course.facing(at, turn) for at in track]
         name = pavement.name("person", number)
         scene.add(
-            *(standing(f"{name} {part}", shape, worn, places, turns, times) for part, shape, worn in parts)
+            *(
+                anchored_object(f"{name} {part}", shape, worn, places, turns, times)
+                for part, shape, worn in parts
+            )
         )
 
 
@@ -320,9 +327,9 @@ class _Wardrobe:
     def __init__(self, rng: np.random.Generator, scene: Assembly) -> None:
         designs = [PersonDesign.sample(rng) for _ in range(3)]
         self.bodies = [(PersonTop(d), PersonLegs(d), PersonSkin(d), PersonHair(d)) for d in designs]
-        self.clothes = [scene.material(finishes.cloth(rng)) for _ in range(6)]
-        self.skins = [scene.material(finishes.skin(rng)) for _ in range(2)]
-        self.hairs = [scene.material(finishes.hair(rng)) for _ in range(2)]
+        self.clothes = [scene.material(street_materials.cloth(rng)) for _ in range(6)]
+        self.skins = [scene.material(street_materials.skin(rng)) for _ in range(2)]
+        self.hairs = [scene.material(street_materials.hair(rng)) for _ in range(2)]
 
     def dressed(self, rng: np.random.Generator) -> _Parts:
         top, legs, skin, hair = choose(rng, self.bodies)

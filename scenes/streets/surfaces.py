@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.placement.assembly import Assembly
+from scenes.appearance import street_materials
+from scenes.placement.assembly import Assembly, anchored_object
 from scenes.random_draws import chance, integer, uniform
-from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.anchored import MetricShape
 from scenes.shapes.street.road import Course, Field, Kerb, RoadMarkings, RoadStrip, Stripe
-from scenes.streets import materials as finishes
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive
@@ -39,7 +39,7 @@ def lay_ground(
     road = (left.kerb_m, -right.kerb_m, uniform(rng, 0.0, 0.06))
     kerb_height = uniform(rng, *config.kerb_m)
     crossings = _crossings(rng)
-    tarmac = scene.material(finishes.asphalt(rng))
+    tarmac = scene.material(street_materials.asphalt(rng))
     _lay(
         scene,
         "road",
@@ -48,8 +48,11 @@ def lay_ground(
     )
     _paint(rng, scene, drive, road, crossings)
     _repairs(rng, scene, course, road)
-    stone, paving = scene.material(finishes.kerb_stone(rng)), scene.material(finishes.pavement(rng))
-    lawn = scene.material(finishes.grass(rng))
+    stone, paving = (
+        scene.material(street_materials.kerb_stone(rng)),
+        scene.material(street_materials.pavement(rng)),
+    )
+    lawn = scene.material(street_materials.grass(rng))
     for side in sides:
         name = "left" if side.sign > 0 else "right"
         width = uniform(rng, 0.12, 0.3) * side.sign
@@ -71,7 +74,7 @@ def lay_ground(
 
 def _lay(scene: Assembly, name: str, shape: MetricShape, material: int) -> None:
     """A shape whose coordinates are the world's."""
-    scene.add(standing(name, shape, material, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
+    scene.add(anchored_object(name, shape, material, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
 
 
 def _strip(course: Course, one_m: float, other_m: float, top_m: float) -> RoadStrip:
@@ -122,11 +125,11 @@ def _paint(
     for middle in crossings:
         stripes += _zebra(rng, drive, road, middle)
     yellow = chance(rng, 0.25)
-    white = scene.material(finishes.road_paint(rng))
+    white = scene.material(street_materials.road_paint(rng))
     centre = [piece for stripe in centre for piece in _interrupted(stripe, crossings)]
     stripes = [piece for stripe in stripes for piece in _interrupted(stripe, crossings)]
     groups = [
-        ("centre line", centre, scene.material(finishes.road_paint(rng, True)) if yellow else white),
+        ("centre line", centre, scene.material(street_materials.road_paint(rng, True)) if yellow else white),
         ("markings", stripes, white),
     ]
     for name, items, material in groups:
@@ -191,4 +194,4 @@ def _repairs(
         patches.append(Stripe(s, s + long, t + wide, t - wide, shear=uniform(rng, -0.2, 0.2)))
     if patches:
         shape = RoadMarkings(course, tuple(patches), road, thickness_m=0.003)
-        _lay(scene, "repairs", shape, scene.material(finishes.tarmac_patch(rng)))
+        _lay(scene, "repairs", shape, scene.material(street_materials.tarmac_patch(rng)))

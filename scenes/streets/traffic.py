@@ -9,16 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from scenes.appearance import street_materials
+from scenes.appearance.materials import plain
 from scenes.appearance.painting import Srgb, shade
-from scenes.placement.assembly import Assembly
+from scenes.placement.assembly import Assembly, anchored_object
 from scenes.random_draws import chance, choose, uniform
-from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.anchored import MetricShape
 from scenes.shapes.street.cars import CarBody, CarDesign, CarGlass, CarLamps, CarTrim
 from scenes.shapes.street.road import Course
 from scenes.shapes.street.vans import CargoBox, VanBody, VanDesign, VanGlass, VanLamps, VanTrim
 from scenes.shapes.street.wheels import MIRROR_M, Wheel, WheelSet
 from scenes.spec import SceneObject
-from scenes.streets import materials as finishes
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive, Lane
@@ -67,12 +68,12 @@ class Fleet:
 
 def sample_fleet(rng: np.random.Generator, scene: Assembly, config: DrivingConfig, lit: bool) -> Fleet:
     shared = {
-        "glass": scene.material(finishes.car_glass(rng)),
-        "trim": scene.material(finishes.black_plastic()),
-        "head": scene.material(finishes.lamp((235, 240, 245), 4.0 if lit else 0.0)),
-        "tail": scene.material(finishes.lamp((170, 16, 18), 1.5 if lit else 0.0)),
+        "glass": scene.material(street_materials.car_glass(rng)),
+        "trim": scene.material(street_materials.black_plastic()),
+        "head": scene.material(street_materials.lamp((235, 240, 245), 4.0 if lit else 0.0)),
+        "tail": scene.material(street_materials.lamp((170, 16, 18), 1.5 if lit else 0.0)),
     }
-    paints = [scene.material(finishes.car_paint(rng)) for _ in range(9)]
+    paints = [scene.material(street_materials.car_paint(rng)) for _ in range(9)]
     cars = [_car_model(rng, scene, shared, paints) for _ in range(4)]
     kinds = choose(rng, [("van", "lorry"), ("van", "bus"), ("lorry", "bus"), ("van", "van")])
     large = [_van_model(rng, scene, shared, paints, kind) for kind in kinds]
@@ -94,7 +95,7 @@ def _car_model(rng: np.random.Generator, scene: Assembly, shared: dict[str, int]
         ),
         painted=(("body", CarBody(design)),),
         wheel=wheel,
-        wheel_material=scene.material(finishes.wheel(rng, wheel.radius, wheel.width)),
+        wheel_material=scene.material(street_materials.wheel(rng, wheel.radius, wheel.width)),
         wheels=wheels,
         wheel_sets=(WheelSet(wheel, wheels), WheelSet(replace(wheel, sides=12), wheels)),
         paint=lambda rng: choose(rng, paints),
@@ -115,18 +116,18 @@ def _van_model(
     ]
     own = list(paints)
     if kind == "lorry":
-        parts.append(("box", CargoBox(design), scene.material(finishes.lettering(rng, _livery(rng)))))
+        parts.append(("box", CargoBox(design), scene.material(street_materials.lettering(rng, _livery(rng)))))
     elif kind == "bus" or chance(rng, 0.4):
-        own = [scene.material(finishes.lettering(rng, _livery(rng)))]
+        own = [scene.material(street_materials.lettering(rng, _livery(rng)))]
     elif chance(rng, 0.5):
-        own = [scene.material(finishes.plain((228, 228, 224), roughness=0.25, specular=0.5))]
+        own = [scene.material(plain((228, 228, 224), roughness=0.25, specular=0.5))]
     return Model(
         length=design.length,
         half_width=design.width / 2 + MIRROR_M,
         parts=tuple(parts),
         painted=(("body", VanBody(design)),),
         wheel=wheel,
-        wheel_material=scene.material(finishes.wheel(rng, wheel.radius, wheel.width)),
+        wheel_material=scene.material(street_materials.wheel(rng, wheel.radius, wheel.width)),
         wheels=wheels,
         wheel_sets=(WheelSet(wheel, wheels), WheelSet(replace(wheel, sides=12), wheels)),
         paint=lambda rng: choose(rng, own),
@@ -166,11 +167,12 @@ def _vehicle(
     paint = model.paint(rng)
     parts = [*model.parts, *[(part, shape, paint) for part, shape in model.painted]]
     objects = [
-        standing(f"{name} {part}", shape, material, places, turns, times) for part, shape, material in parts
+        anchored_object(f"{name} {part}", shape, material, places, turns, times)
+        for part, shape, material in parts
     ]
     if len(times) == 1:
         wheels = model.wheel_sets[abs(s_m[0]) > _FINE_M]
-        objects.append(standing(f"{name} wheels", wheels, model.wheel_material, places, turns))
+        objects.append(anchored_object(f"{name} wheels", wheels, model.wheel_material, places, turns))
         return tuple(objects)
     forward = 1.0 if turn_deg == 0.0 else -1.0
     start = uniform(rng, 0.0, 2 * math.pi)
@@ -185,7 +187,9 @@ def _vehicle(
             spots.append((float(hub[0]), float(hub[1]), float(hub[2])))
             attitudes.append(facing * Rotation.from_euler("Y", angle))
         objects.append(
-            standing(f"{name} wheel {number}", model.wheel, model.wheel_material, spots, attitudes, rolled[0])
+            anchored_object(
+                f"{name} wheel {number}", model.wheel, model.wheel_material, spots, attitudes, rolled[0]
+            )
         )
     return tuple(objects)
 

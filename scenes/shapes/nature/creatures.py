@@ -8,11 +8,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import Triangles, Vertices, icosphere, joined, scaled_normals, solid, tube
+from scenes.geometry.building import Part, Triangles, Vertices, icosphere, joined, scaled_normals, tube
 from scenes.geometry.implicit_surfaces import blended_capsules, surface_net
-from scenes.geometry.mesh import Mesh
 from scenes.random_draws import chance, integer, log_uniform, new_seed, uniform
-from scenes.shapes.anchored import Part, PartedShape
+from scenes.shapes.anchored import PartedShape, Surface
 from scenes.shapes.solids.organic import wave_noise
 from scenes.spec import Vector
 
@@ -167,9 +166,9 @@ class Eyeballs(PartedShape):
         ball, triangles = icosphere(3)
         return {"eyes": joined(*((ball * self.radius + centre, triangles) for centre in self.centres))}
 
-    def mesh(self) -> Mesh:
-        """The picture is laid on from the front, equal in area: its middle is the pupil (Lambert 1772)."""
-        vertices, triangles = self.surface()
+    def surface(self) -> Surface:
+        """The texture is projected from the front by Lambert's equal-area projection (1772), pupil in the middle."""
+        eyes = super().surface()
         ball, _ = icosphere(3)
         gaze = np.array(self.gaze) / np.linalg.norm(self.gaze)
         right = np.cross(gaze, (0.0, 0.0, 1.0))
@@ -177,12 +176,12 @@ class Eyeballs(PartedShape):
         up = np.cross(right, gaze)
         flat = np.sqrt(2 / np.maximum(1 + ball @ gaze, 0.02))[:, None] * (ball @ np.stack([right, up], -1))
         uv = np.tile(np.clip(flat, -2, 2) * self.radius, (len(self.centres), 1))
-        return solid(vertices, triangles, uv=uv[triangles], smooth=True, crease_deg=None)
+        return Surface(eyes.vertices, eyes.triangles, uv[eyes.triangles])
 
 
 def iris_repeats(eyes: Eyeballs) -> float:
-    """How often a picture must repeat so that it spans the eye from side to side, its corner in the pupil."""
-    return 1.0 / (2 * 2.0 * eyes.radius * eyes.frame().factor)
+    """How often a texture must repeat to span the eyeball once, its corner in the pupil (`Material.repeats`)."""
+    return 1.0 / (2 * 2.0 * eyes.radius * eyes.frame.factor)
 
 
 @dataclass(frozen=True)

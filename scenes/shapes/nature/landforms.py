@@ -9,10 +9,19 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import Triangles, Vertices, grid_triangles, icosphere, joined, revolve, solid
+from scenes.geometry.building import (
+    Part,
+    Triangles,
+    Vertices,
+    grid_triangles,
+    icosphere,
+    joined,
+    revolve,
+    solid,
+)
 from scenes.geometry.mesh import Mesh
 from scenes.random_draws import chance, integer, log_uniform, new_seed, uniform
-from scenes.shapes.anchored import Part, PartedShape
+from scenes.shapes.anchored import PartedShape
 from scenes.shapes.solids.basic import sample_proportions
 from scenes.shapes.solids.organic import wave_noise
 from scenes.spec import Shape, Vector

@@ -9,9 +9,9 @@ import numpy as np
 from manifold3d import Manifold, OpType
 from numpy.typing import NDArray
 
-from scenes.geometry.building import cross_section, grid_triangles, joined, manifold_arrays
+from scenes.geometry.building import Part, cross_section, grid_triangles, joined, manifold_arrays
 from scenes.random_draws import chance, integer, new_seed, uniform
-from scenes.shapes.anchored import Part, PartedShape
+from scenes.shapes.anchored import PartedShape
 from scenes.shapes.solids.organic import wave_noise
 
 _BOX = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)

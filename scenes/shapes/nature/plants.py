@@ -10,11 +10,11 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from scenes.geometry.building import joined, revolve, struts
+from scenes.geometry.building import Part, joined, revolve, struts
 from scenes.geometry.leaves import arched, around, horizontal_side, strips
 from scenes.geometry.stems import UP, leaf_cloud, stem, unit, winding_path
 from scenes.random_draws import choose, integer, log_uniform, new_seed, uniform
-from scenes.shapes.anchored import Part, PartedShape
+from scenes.shapes.anchored import PartedShape
 from scenes.spec import Shape
 
 

@@ -7,11 +7,11 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from scenes.geometry.building import Vertices, joined
+from scenes.geometry.building import Part, Vertices, joined
 from scenes.geometry.leaves import arched, around, horizontal_side, strips
 from scenes.geometry.stems import UP, leaf_cloud, stem, unit, winding_path
 from scenes.random_draws import integer, new_seed, uniform
-from scenes.shapes.anchored import Part, PartedShape
+from scenes.shapes.anchored import PartedShape
 
 
 @dataclass(frozen=True)

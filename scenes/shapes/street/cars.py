@@ -8,10 +8,11 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import joined, revolve
+from scenes.geometry.building import Part, joined, revolve
+from scenes.geometry.polyhedra import boxes, hexahedra, loft
 from scenes.random_draws import choose, uniform
-from scenes.shapes.metric import MetricShape, Surface, boxes, hexahedra, loft
-from scenes.shapes.street.wheels import MIRROR_M, Part, without_arches
+from scenes.shapes.anchored import MetricShape, Surface
+from scenes.shapes.street.wheels import MIRROR_M, without_arches
 from scenes.spec import Vector
 
 

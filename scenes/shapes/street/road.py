@@ -12,8 +12,9 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 from scenes.geometry.building import Triangles, Vertices, grid_triangles, joined
+from scenes.geometry.polyhedra import boxes, loft, outward
 from scenes.random_draws import chance, integer, uniform
-from scenes.shapes.metric import MetricShape, Surface, boxes, loft, outward
+from scenes.shapes.anchored import MetricShape, Surface
 from scenes.spec import Vector
 
 _STEP_M = 0.5

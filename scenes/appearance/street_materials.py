@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from scenes.appearance.materials import plain, tiled
 from scenes.appearance.painting import Srgb, sample_palette, shade
 from scenes.random_draws import chance, choose, integer, log_uniform, new_seed, uniform
-from scenes.shapes.street.buildings import NOMINAL_BAY_M, HouseDesign
 from scenes.spec import Material, Texture
 from scenes.textures.foliage import Bark, Foliage, Grass
 from scenes.textures.houses import Plaster, RoofTiles, WindowPanes
 from scenes.textures.layers import Layered
 from scenes.textures.marks import BlurredShapes, DeadLeaves, Facade, GlyphRows
 from scenes.textures.noise import WoodPlanks
-from scenes.textures.plain import NearTextureless, SolidColor
+from scenes.textures.plain import NearTextureless
 from scenes.textures.streets import Asphalt, Paving, RoadMarkingPaint, RoadSign, WheelFace
 from scenes.textures.tiles import Bricks, Plaid, Stripes
 
@@ -29,15 +29,6 @@ WINDOW_FRAMES: tuple[Srgb, ...] = (
     (64, 72, 84),
 )
 """White mostly, dark green, brown, grey."""
-
-
-def tiled(texture: Texture, tile_m: float) -> Material:
-    """A matte material whose picture spans `tile_m` metres."""
-    return Material(texture, repeats=1.0 / tile_m)
-
-
-def plain(color: Srgb, *, roughness: float = 1.0, specular: float = 0.0, metallic: float = 0.0) -> Material:
-    return Material(SolidColor(color), roughness=roughness, specular=specular, metallic=metallic)
 
 
 def asphalt(rng: np.random.Generator) -> Material:
@@ -109,11 +100,21 @@ def trim(rng: np.random.Generator) -> Material:
     return tiled(NearTextureless(64, new_seed(rng), color, 0.04, 0.03), 1.5)
 
 
-def windows(rng: np.random.Generator, design: HouseDesign, frame: Srgb, lit: float) -> Material:
-    panes = replace(
-        WindowPanes.sample(rng, 320), opening=design.opening, sill=design.sill, frame=frame, lit=lit
-    )
-    material = tiled(panes, WindowPanes.CELLS * NOMINAL_BAY_M)
+def windows(
+    rng: np.random.Generator,
+    opening: tuple[float, float],
+    sill: float,
+    cell_m: float,
+    frame: Srgb,
+    lit: float,
+) -> Material:
+    """Windows behind the openings of a wall (`scenes.textures.houses.WindowPanes`), glowing where some are lit.
+
+    `opening` and `sill` are shares of a cell, one bay of one floor, which is `cell_m` of texture coordinates;
+    `lit` is the share of the windows with light behind them.
+    """
+    panes = replace(WindowPanes.sample(rng, 320), opening=opening, sill=sill, frame=frame, lit=lit)
+    material = tiled(panes, WindowPanes.CELLS * cell_m)
     if lit:
         return replace(material, emission=0.25, specular=0.3, roughness=0.3)
     return replace(material, specular=uniform(rng, 0.5, 0.9), roughness=uniform(rng, 0.02, 0.12))
@@ -229,8 +230,9 @@ def cloth(rng: np.random.Generator) -> Material:
     if kind < 0.7:
         color = shade(uniform(rng, 0.2, 0.85), log_uniform(rng, 0.01, 0.16), uniform(rng, 0.0, 360.0))
         return tiled(NearTextureless(64, new_seed(rng), color, 0.1, 0.08), 0.35)
-    pattern: Texture = Stripes.sample(rng, 64) if kind < 0.85 else Plaid.sample(rng, 64)
-    return tiled(replace(pattern, palette=sample_palette(rng, 4)), 0.25)  # type: ignore[call-arg]
+    if kind < 0.85:
+        return tiled(replace(Stripes.sample(rng, 64), palette=sample_palette(rng, 4)), 0.25)
+    return tiled(replace(Plaid.sample(rng, 64), palette=sample_palette(rng, 4)), 0.25)
 
 
 def skin(rng: np.random.Generator) -> Material:
