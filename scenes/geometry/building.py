@@ -133,6 +133,46 @@ def grid_triangles(
     return cells.reshape(-1, 3).astype(np.int64)
 
 
+def grid_rim(rows: int, columns: int) -> NDArray[np.int64]:
+    """Indices of the border of a grid of rows x columns vertices, once around in the sense of its triangles."""
+    index = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
+    return np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
+
+
+def slab_triangles(rows: int, columns: int) -> Triangles:
+    """The closed slab between two grids of rows x columns vertices: first all of the top, then all of the bottom."""
+    count = rows * columns
+    face, rim = grid_triangles(rows, columns), grid_rim(rows, columns)
+    following = np.roll(rim, -1)
+    walls = [
+        np.stack([rim, rim + count, following + count], -1),
+        np.stack([rim, following + count, following], -1),
+    ]
+    return np.concatenate([face, face[:, ::-1] + count, *walls])
+
+
+def block_under(
+    top: NDArray[np.float64], floor: float, middle: tuple[float, float] | None = None
+) -> tuple[Vertices, Triangles]:
+    """The closed block between a surface (R, C, 3) and a flat floor at z = `floor`.
+
+    The floor is a fan about `middle` (x, y), by default the mean of the surface's points.
+    """
+    rows, columns = top.shape[:2]
+    ring = grid_rim(rows, columns)
+    points = top.reshape(-1, 3)
+    skirt = np.column_stack([points[ring, :2], np.full(len(ring), floor)])
+    below = len(points) + np.arange(len(ring))
+    along, along_below = np.roll(ring, -1), np.roll(below, -1)
+    hub = np.full(len(ring), len(points) + len(ring))
+    walls = [np.stack([ring, below, along_below], -1), np.stack([ring, along_below, along], -1)]
+    triangles = np.concatenate(
+        [grid_triangles(rows, columns), *walls, np.stack([hub, along_below, below], -1)]
+    )
+    centre = points[:, :2].mean(axis=0) if middle is None else middle
+    return np.concatenate([points, skirt, [(*centre, floor)]]), triangles
+
+
 def revolve(
     radius: NDArray[np.float64], height: NDArray[np.float64], sides: int, angle: float = 0.0
 ) -> tuple[Vertices, Triangles]:

@@ -9,16 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import (
-    Part,
-    Triangles,
-    Vertices,
-    grid_triangles,
-    icosphere,
-    joined,
-    revolve,
-    solid,
-)
+from scenes.geometry.building import Part, block_under, grid_triangles, icosphere, joined, revolve, solid
 from scenes.geometry.mesh import Mesh
 from scenes.random_draws import chance, integer, log_uniform, new_seed, uniform
 from scenes.shapes.anchored import PartedShape
@@ -127,24 +118,6 @@ class Landscape(Shape):
         height = self.heights()
         y, x = np.meshgrid(self.line(), self.line(), indexing="ij")
         return solid(*block_under(np.stack([x, y, height], -1), self._floor(height)), smooth=True)
-
-
-def block_under(top: NDArray[np.float64], floor: float) -> tuple[Vertices, Triangles]:
-    """The closed block between a (R, C, 3) surface and a flat floor."""
-    rows, columns = top.shape[:2]
-    index = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
-    ring = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
-    points = top.reshape(-1, 3)
-    skirt = np.column_stack([points[ring, :2], np.full(len(ring), floor)])
-    below = len(points) + np.arange(len(ring))
-    along, along_below = np.roll(ring, -1), np.roll(below, -1)
-    hub = np.full(len(ring), len(points) + len(ring))
-    walls = [np.stack([ring, below, along_below], -1), np.stack([ring, along_below, along], -1)]
-    triangles = np.concatenate(
-        [grid_triangles(rows, columns), *walls, np.stack([hub, along_below, below], -1)]
-    )
-    middle = (*points[:, :2].mean(axis=0), floor)
-    return np.concatenate([points, skirt, [middle]]), triangles
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from scenes.geometry.building import Triangles, Vertices, grid_triangles, icosphere, joined, solid, struts
+from scenes.geometry.building import Triangles, Vertices, block_under, icosphere, joined, solid, struts
 from scenes.geometry.mesh import Mesh
 from scenes.random_draws import integer, log_uniform, new_seed, uniform
 from scenes.shapes.solids.basic import sample_proportions
@@ -246,24 +246,6 @@ class Terrain(Shape):
 
     def mesh(self) -> Mesh:
         plan = self._plan()
-        top = np.column_stack([plan, self.height(plan)])
-        floor = float(top[:, 2].min()) - self.depth
-        n = self.cells + 1
-        ring = np.concatenate(
-            [
-                np.arange(n),
-                np.arange(1, n) * n + n - 1,
-                n * n - 2 - np.arange(n - 1),
-                np.arange(n - 2, 0, -1) * n,
-            ]
-        )
-        skirt = np.column_stack([plan[ring], np.full(len(ring), floor)])
-        below = n * n + np.arange(len(ring))
-        along, along_below = np.roll(ring, -1), np.roll(below, -1)
-        walls = np.concatenate(
-            [np.stack([ring, below, along_below], -1), np.stack([ring, along_below, along], -1)]
-        )
-        hub = np.full(len(ring), n * n + len(ring))
-        bottom = np.stack([hub, along_below, below], -1)
-        vertices = np.concatenate([top, skirt, [(0.0, 0.0, floor)]])
-        return solid(vertices, np.concatenate([grid_triangles(n, n), walls, bottom]), smooth=True)
+        height = self.height(plan)
+        top = np.column_stack([plan, height]).reshape(self.cells + 1, self.cells + 1, 3)
+        return solid(*block_under(top, float(height.min()) - self.depth, (0.0, 0.0)), smooth=True)

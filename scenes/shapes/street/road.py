@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
-from scenes.geometry.building import Triangles, Vertices, grid_triangles, joined
+from scenes.geometry.building import Triangles, Vertices, joined, slab_triangles
 from scenes.geometry.polyhedra import boxes, loft, outward
 from scenes.random_draws import chance, integer, uniform
 from scenes.shapes.anchored import MetricShape, Surface
@@ -198,25 +198,13 @@ class RoadMarkings(MetricShape):
         s = s + stripe.shear * np.linspace(0.0, 1.0, columns)
         plan = self.course.point(s, t).reshape(-1, 2)
         height = self._height(t).ravel()
-        count = rows * columns
-        face = grid_triangles(rows, columns)
-        index = np.arange(count).reshape(rows, columns)
-        rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
-        following = np.roll(rim, -1)
-        walls = np.concatenate(
-            [
-                np.stack([rim, rim + count, following + count], -1),
-                np.stack([rim, following + count, following], -1),
-            ]
-        )
         vertices = np.concatenate(
             [
                 np.column_stack([plan, height + self.thickness_m]),
                 np.column_stack([plan, height - 0.02]),
             ]
         )
-        triangles = np.concatenate([face, face[:, ::-1] + count, walls])
-        return vertices, outward(vertices, triangles)
+        return vertices, outward(vertices, slab_triangles(rows, columns))
 
 
 @dataclass(frozen=True)
