@@ -16,6 +16,7 @@ Count = tuple[int, int]
 
 
 def uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """Uniform over low .. high."""
     return float(rng.uniform(low, high))
 
 
@@ -30,6 +31,7 @@ def integer(rng: np.random.Generator, low: int, high: int) -> int:
 
 
 def chance(rng: np.random.Generator, probability: float) -> bool:
+    """True with a probability."""
     return bool(rng.random() < probability)
 
 

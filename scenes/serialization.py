@@ -108,6 +108,7 @@ def _describe(error: BaseException, kind: type | None) -> str:
 
 
 def scene_to_json(scene: Scene) -> str:
+    """The scene as indented JSON text, which `scene_from_json` reads."""
     return json.dumps(_converter.unstructure(scene), indent=1)
 
 

@@ -7,7 +7,7 @@ same geometry and the same pixels on any machine. `scenes.serialization` turns i
 Frames of reference
 -------------------
 World: right-handed, z up, metres. Camera: x right, y up, looking along -z (Blender's and OpenGL's
-convention). The rig's pose is the left eye's; the right eye is `baseline_m` along the rig's own x axis.
+convention). The rig's pose is the left camera's; the right camera is `baseline_m` along the rig's own x axis.
 Time is in frames; frame k of a scene is the instant t = k, k = 0 .. frames - 1.
 """
 
@@ -134,6 +134,7 @@ class Trajectory:
 
     @classmethod
     def static(cls, position_m: Vector = (0.0, 0.0, 0.0), rotation: Quaternion = IDENTITY_ROTATION) -> Self:
+        """The trajectory of what does not move."""
         return cls(times_frames=(0.0,), positions_m=(position_m,), rotations=(rotation,))
 
     @cached_property
@@ -197,7 +198,7 @@ class StereoCamera:
     focal_mm: float
     baseline_m: float
     motion: Trajectory
-    """Path of the left eye."""
+    """Path of the left camera."""
     sensor_width_mm: float = 32.0
 
     def __post_init__(self) -> None:
@@ -215,18 +216,20 @@ class StereoCamera:
         """fx * B: disparity in pixels times depth in metres."""
         return self.focal_px * self.baseline_m
 
-    def pose(self, eye: str, time_frames: float) -> NDArray[np.float64]:
-        """The (4, 4) camera-to-world matrix of the "left" or "right" eye."""
+    def pose(self, view: str, time_frames: float) -> NDArray[np.float64]:
+        """The (4, 4) camera-to-world matrix of the "left" or "right" view; ValueError for any other name."""
         pose = self.motion.pose(time_frames)
-        if eye == "right":
+        if view == "right":
             pose[:3, 3] += pose[:3, 0] * self.baseline_m
-        elif eye != "left":
-            raise ValueError(f"an eye is 'left' or 'right', not {eye!r}")
+        elif view != "left":
+            raise ValueError(f"a view is 'left' or 'right', not {view!r}")
         return pose
 
 
 @dataclass(frozen=True)
 class SunLight:
+    """A light at infinity."""
+
     direction: Vector
     """Where the light travels to (world)."""
     color: Color
@@ -238,6 +241,8 @@ class SunLight:
 
 @dataclass(frozen=True)
 class AreaLight:
+    """A square lamp that shines from a position towards a target."""
+
     position_m: Vector
     target_m: Vector
     color: Color
@@ -281,9 +286,9 @@ class FinalPass:
     vignetting: float = 0.0
     """Share of the light lost in the corners, 0..1."""
     exposure_difference_ev: float = 0.0
-    """The right eye's exposure against the left's, in stops."""
+    """The right view's exposure relative to the left's, in stops."""
     right_view_color: Color = (1.0, 1.0, 1.0)
-    """The right eye's colour balance against the left's, gain an RGB channel."""
+    """The right view's colour balance relative to the left's: a gain for each RGB channel."""
 
 
 @dataclass(frozen=True)

@@ -16,16 +16,19 @@ _HALF, _ONE, _TWO, _THREE = np.float32(0.5), np.float32(1), np.float32(2), np.fl
 
 @vectorize(["f4(f4,f4,f4)", "f8(f4,f4,f8)", "f8(f8,f8,f8)"], cache=True)
 def blended(below, above, cover):
+    """`above` over `below`, (...) each, with an opacity `cover`."""
     return (above - below) * cover + below
 
 
 @vectorize(["f4(f4)", "f8(f8)"], cache=True)
 def fraction(value):
+    """The fractional part of (...) values, 0..1."""
     return value - np.floor(value)
 
 
 @vectorize(["f4(f4,f4,f4)", "f8(f8,f4,f4)"], cache=True)
 def smooth_stepped(value, edge, width):
+    """0 below an edge, 1 above it, with a cubic ramp of a width about it, for (...) values."""
     t = (value - edge) / width + _HALF
     t = min(max(t, _BLACK), _ONE)
     return t * t * (_THREE - _TWO * t)

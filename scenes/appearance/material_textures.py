@@ -30,7 +30,7 @@ from scenes.appearance.palettes import (
 from scenes.random_draws import choose, integer, uniform
 from scenes.spec import Texture
 from scenes.textures.cells import Cobblestones, VoronoiCells
-from scenes.textures.marks import DeadLeaves
+from scenes.textures.collages import DeadLeaves
 from scenes.textures.natural import Hair, Iris, LeafVeins, Litter, RoughBark, Strata
 from scenes.textures.noise import FractalNoise, Labyrinth, WoodPlanks
 from scenes.textures.plain import Gradient
@@ -43,6 +43,8 @@ _Pattern = Dots | Gradient | Labyrinth | Stripes | Weave
 
 
 def leaves(colors: PaletteRange = FOLIAGE) -> TextureSampler:
+    """Leaves: veined, or blotched where they are too small to show veins."""
+
     def draw(rng: np.random.Generator, size: int) -> Texture:
         palette = sample_palette_in(rng, colors, 4)
         if rng.random() < 0.6:
@@ -75,6 +77,8 @@ def grains(colors: PaletteRange) -> TextureSampler:
 
 
 def rock(colors: PaletteRange = ROCK, dust: PaletteRange = MOSS) -> TextureSampler:
+    """Layered or massive rock with moss, sand or snow in its hollows; `dust` are the colours of those."""
+
     def draw(rng: np.random.Generator, size: int) -> Texture:
         return Strata.of(rng, size, sample_palette_in(rng, colors, 4), sample_palette_in(rng, dust, 1)[0])
 
@@ -108,11 +112,13 @@ def paving(rng: np.random.Generator, size: int) -> Texture:
 
 
 def plaster(rng: np.random.Generator, size: int) -> Texture:
+    """Painted or weathered walls."""
     palette = sample_palette_in(rng, PLASTER, 4)
     return _noise(rng, size, palette) if rng.random() < 0.6 else Strata.of(rng, size, palette, palette[0])
 
 
 def roofing(rng: np.random.Generator, size: int) -> Texture:
+    """Tiles, or thatch."""
     palette = sample_palette_in(rng, TILES, 4)
     if rng.random() < 0.7:
         return replace(Bricks.sample(rng, size), palette=palette[1:], mortar=palette[0])
@@ -120,15 +126,18 @@ def roofing(rng: np.random.Generator, size: int) -> Texture:
 
 
 def bark(rng: np.random.Generator, size: int) -> Texture:
+    """Ridged bark with lichen."""
     return RoughBark.of(rng, size, sample_palette_in(rng, BARK, 4), sample_palette_in(rng, MOSS, 2)[1])
 
 
 def culm(rng: np.random.Generator, size: int) -> Texture:
+    """The green or yellow stems of bamboo."""
     palette = sample_palette_in(rng, replace(FOLIAGE, hue_deg=(90.0, 130.0)), 4)
     return RoughBark.of(rng, size, palette, sample_palette_in(rng, DRY_GRASS, 2)[1])
 
 
 def timber(rng: np.random.Generator, size: int) -> Texture:
+    """Planks."""
     return replace(WoodPlanks.sample(rng, size), palette=sample_palette_in(rng, BARK, 2))
 
 
@@ -158,15 +167,18 @@ def hide(rng: np.random.Generator, size: int) -> Texture:
 
 
 def skin(rng: np.random.Generator, size: int) -> Texture:
+    """Human skin."""
     return _noise(rng, size, sample_palette_in(rng, SKIN, 3), low_cycles=6.0)
 
 
 def hair(rng: np.random.Generator, size: int) -> Texture:
+    """Human hair."""
     palette = sample_palette_in(rng, HAIR, 3)
     return replace(Hair.of(rng, size, palette, palette[0]), pattern="none")
 
 
 def leather(rng: np.random.Generator, size: int) -> Texture:
+    """Brown leather."""
     return _noise(rng, size, sample_palette_in(rng, BARK, 3), low_cycles=8.0)
 
 
@@ -189,10 +201,12 @@ def cap(rng: np.random.Generator, size: int) -> Texture:
 
 
 def eye(rng: np.random.Generator, size: int) -> Texture:
+    """The iris, pupil and white of an eye (`scenes.textures.natural.Iris`)."""
     return Iris.sample(rng, size)
 
 
 def horn(rng: np.random.Generator, size: int) -> Texture:
+    """Pale ridged horn; also the stems of mushrooms."""
     return RoughBark.of(rng, size, sample_palette_in(rng, PLASTER, 3), sample_palette_in(rng, EARTH, 1)[0])
 
 

@@ -10,10 +10,10 @@ from scenes.appearance.materials import plain, tiled
 from scenes.appearance.painting import Srgb, sample_palette, shade
 from scenes.random_draws import chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.spec import Material, Texture
+from scenes.textures.collages import BlurredShapes, DeadLeaves, Facade, GlyphRows
 from scenes.textures.foliage import Bark, Foliage, Grass
 from scenes.textures.houses import Plaster, RoofTiles, WindowPanes
 from scenes.textures.layers import Layered
-from scenes.textures.marks import BlurredShapes, DeadLeaves, Facade, GlyphRows
 from scenes.textures.noise import WoodPlanks
 from scenes.textures.plain import NearTextureless
 from scenes.textures.streets import Asphalt, Paving, RoadMarkingPaint, RoadSign, WheelFace
@@ -32,14 +32,17 @@ WINDOW_FRAMES: tuple[Srgb, ...] = (
 
 
 def asphalt(rng: np.random.Generator) -> Material:
+    """A carriageway."""
     return tiled(Asphalt.sample(rng, 400), uniform(rng, 3.2, 4.4))
 
 
 def tarmac_patch(rng: np.random.Generator) -> Material:
+    """A repaired patch of a carriageway."""
     return tiled(Asphalt.sample(rng, 256), 2.3)
 
 
 def pavement(rng: np.random.Generator) -> Material:
+    """Slabs, blocks or tarmac."""
     if chance(rng, 0.2):
         return tiled(Asphalt.sample(rng, 256), uniform(rng, 2.5, 3.5))
     paving = Paving.sample(rng, 256)
@@ -49,15 +52,18 @@ def pavement(rng: np.random.Generator) -> Material:
 
 
 def grass(rng: np.random.Generator) -> Material:
+    """Lawns and open land."""
     return tiled(Grass.sample(rng, 256), uniform(rng, 2.0, 3.5))
 
 
 def kerb_stone(rng: np.random.Generator) -> Material:
+    """Grey kerb stones."""
     grey = shade(uniform(rng, 0.55, 0.75), 0.01, 80.0)
     return tiled(Plaster(128, new_seed(rng), grey, 0.08, 0.0, 0.12), 1.0)
 
 
 def road_paint(rng: np.random.Generator, yellow: bool = False) -> Material:
+    """White or yellow road markings."""
     paint = RoadMarkingPaint.sample(rng, 256)
     return tiled(replace(paint, color=shade(0.8, 0.15, 88.0)) if yellow else paint, 2.2)
 
@@ -91,6 +97,7 @@ def wall(rng: np.random.Generator, plastered: float) -> Material:
 
 
 def trim(rng: np.random.Generator) -> Material:
+    """Painted window sills, frames and cornices: mostly white."""
     hue = uniform(rng, 20.0, 280.0)
     color = (
         shade(uniform(rng, 0.8, 0.95), 0.015, 90.0)
@@ -130,12 +137,14 @@ def shop_window(rng: np.random.Generator, lit: float) -> Material:
 
 
 def shop_board(rng: np.random.Generator) -> Material:
+    """A shop's lettered name board."""
     return tiled(
         replace(GlyphRows.sample(rng, 128), lines=3, letters=integer(rng, 4, 6)), uniform(rng, 1.4, 1.9)
     )
 
 
 def roof(rng: np.random.Generator) -> Material:
+    """Roof tiles or slates."""
     tiles = RoofTiles.sample(rng, 256)
     return tiled(tiles, tiles.rows * uniform(rng, 0.2, 0.32))
 
@@ -168,12 +177,14 @@ def car_paint(rng: np.random.Generator) -> Material:
 
 
 def car_glass(rng: np.random.Generator) -> Material:
+    """The dark windows of vehicles."""
     return plain(
         shade(uniform(rng, 0.16, 0.3), 0.02, uniform(rng, 160.0, 260.0)), roughness=0.03, specular=0.9
     )
 
 
 def black_plastic() -> Material:
+    """Bumpers, grilles and the housings of traffic lights."""
     return plain((26, 26, 28), roughness=0.6, specular=0.3)
 
 
@@ -183,6 +194,7 @@ def lamp(color: Srgb, lit: float) -> Material:
 
 
 def wheel(rng: np.random.Generator, radius_m: float, width_m: float) -> Material:
+    """The side of a wheel of a radius and a width in metres, unrolled onto its tread."""
     face = WheelFace.sample(rng, 128)
     # The picture is as wide as the wheel with its tread unrolled.
     side_m = 2.02 * (radius_m + 0.5 * width_m)
@@ -199,14 +211,17 @@ def lettering(rng: np.random.Generator, color: Srgb) -> Material:
 
 
 def foliage(rng: np.random.Generator) -> Material:
+    """The leaves of street trees, hedges and shrubs."""
     return tiled(Foliage.sample(rng, 256), uniform(rng, 1.4, 2.2))
 
 
 def bark(rng: np.random.Generator) -> Material:
+    """The stems of street trees."""
     return tiled(Bark.sample(rng, 128), 0.8)
 
 
 def metal_paint(rng: np.random.Generator) -> Material:
+    """Painted metal: posts, bins, railings."""
     color = shade(uniform(rng, 0.2, 0.75), uniform(rng, 0.0, 0.05), choose(rng, [150.0, 250.0, 90.0]))
     return tiled(NearTextureless(64, new_seed(rng), color, 0.06, 0.04), 0.8)
 
@@ -219,6 +234,7 @@ def fence(rng: np.random.Generator, kind: str) -> Material:
 
 
 def wood(rng: np.random.Generator) -> Material:
+    """Planks of benches and fences."""
     base = uniform(rng, 0.45, 0.75)
     palette = (shade(base, 0.06, 65.0), shade(base - 0.15, 0.06, 60.0))
     return tiled(replace(WoodPlanks.sample(rng, 128), palette=palette, planks=4), 0.9)
@@ -236,11 +252,13 @@ def cloth(rng: np.random.Generator) -> Material:
 
 
 def skin(rng: np.random.Generator) -> Material:
+    """Human skin."""
     lightness = uniform(rng, 0.42, 0.83)
     return plain(shade(lightness, 0.06, 55.0), roughness=0.7, specular=0.2)
 
 
 def hair(rng: np.random.Generator) -> Material:
+    """Human hair, or a cap."""
     return plain(
         choose(
             rng,
@@ -256,6 +274,7 @@ def hair(rng: np.random.Generator) -> Material:
 
 
 def sign_face(rng: np.random.Generator, corners: int) -> Material:
+    """The face of a traffic sign with a number of corners, 0 for a disc."""
     face = RoadSign.sample(rng, 128)
     while face.corners != corners:
         face = RoadSign.sample(rng, 128)

@@ -62,7 +62,7 @@ class FlyingThingsConfig(FamilyConfig):
     focal_mm: Range = (35.0, 35.0)
     """Focal length on a sensor 32 mm wide."""
     baseline_m: Range = (1.0, 1.0)
-    """Distance between the eyes."""
+    """Distance between the cameras."""
     disparity_share: Range = (0.002, 0.167)
     """Disparity of the farthest and the nearest surface, as a share of the image width: 2 to 160 px at 960."""
     background_disparity_share: Range = (0.005, 0.04)

@@ -65,7 +65,7 @@ def arched(
     return straight
 
 
-def horizontal_side(direction: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+def width_directions(direction: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
     """(N, 3) unit vectors across each direction (N, 3), level where the direction is not upright."""
     heading = rng.uniform(0.0, 2 * np.pi, len(direction))
     aside = np.stack([np.cos(heading), np.sin(heading), np.zeros(len(direction))], -1)

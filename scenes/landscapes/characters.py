@@ -85,10 +85,12 @@ class CharacterBuilder:
         phase: float = 0.0,
         cycles: int = 1,
     ) -> int:
+        """Add a joint (`Joint`); returns its index. `parent` is -1 for the root; lengths are body units."""
         self.joints.append(Joint(parent, start, end, radius, axis, swing_deg, cycles, phase))
         return len(self.joints) - 1
 
     def flesh(self, group: str, start: Vector, end: Vector, radius: float, end_radius: float) -> None:
+        """Add a capsule of flesh to the group of limbs that becomes one mesh."""
         self.limbs.setdefault(group, []).append(Limb(start, end, radius, end_radius))
 
     def bone(
@@ -121,6 +123,7 @@ class Gait:
 
 
 def sample_gait(rng: np.random.Generator) -> Gait:
+    """Draw a random gait; half of them walk."""
     walks = chance(rng, 0.5)
     return Gait(
         walks=walks,
@@ -384,6 +387,10 @@ def assemble_character(
     leg: float,
     fringe: float,
 ) -> Character:
+    """A character from its meshes and the builder's joints.
+
+    `leg` is the length of the legs, which sets the stride; `fringe` how far fur stands out, in body units.
+    """
     ends = [(limb.end, limb.end_radius) for group in body.limbs.values() for limb in group]
     ends += [(limb.start, limb.start_radius) for group in body.limbs.values() for limb in group]
     # A walker covers four times the reach of a leg's swing in a period.

@@ -153,7 +153,7 @@ def sample_focus(
 ) -> Focus:
     """Look at a character of a size and at a distance from about a height, the character about mid-image.
 
-    The eye is raised where the image's lower edge would otherwise show ground nearer than allowed.
+    The camera is raised where the image's lower edge would otherwise show ground nearer than allowed.
     """
     share = uniform(rng, *config.focus_disparity_share)
     half_high = half_height(focal_mm, config)

@@ -28,6 +28,7 @@ Holds = Callable[[Spot], bool]
 
 
 def anywhere(_: Spot) -> bool:
+    """Whether a spot may be planted: all may."""
     return True
 
 
@@ -50,11 +51,11 @@ class VegetationArea:
         return [spot for spot in drawn if self.holds(spot)]
 
 
-STILL_BEYOND = 2.2
+NO_SWAY_BEYOND = 2.2
 """Plants farther away than this many units do not sway: too little to see, and they can share their meshes."""
 
 
-def _outfits(rng: np.random.Generator, kinds: Sequence[T], materials: Sequence[int]) -> list[tuple[T, int]]:
+def _pairings(rng: np.random.Generator, kinds: Sequence[T], materials: Sequence[int]) -> list[tuple[T, int]]:
     """Each kind and each material at least once, in few pairs: things alike in both are one mesh."""
     count = max(len(kinds), len(materials)) + 2
     order = rng.permutation(count)
@@ -76,7 +77,7 @@ def trees(
     seen_m = 1.6 * depths[0] * unit_m
     wood = [placement.new_material(rng, trunk, unit_m, seen_m) for _ in range(2)]
     green = [placement.new_material(rng, sampler, unit_m, seen_m) for sampler in foliage]
-    outfits = [(kind, leaf, choose(rng, wood)) for kind, leaf in _outfits(rng, kinds, green)]
+    outfits = [(kind, leaf, choose(rng, wood)) for kind, leaf in _pairings(rng, kinds, green)]
     for index, spot in enumerate(area.spots(rng, count, depths, 1.2)):
         kind, leaf, stem = choose(rng, outfits)
         worn = {"wood": stem, "leaves": leaf}
@@ -101,10 +102,10 @@ def plants(
     placement, unit_m = area.placement, area.unit_m
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
     green = [placement.new_material(rng, sampler, middle_m, 1.4 * depths[0] * unit_m) for sampler in foliage]
-    outfits = _outfits(rng, kinds, green)
+    outfits = _pairings(rng, kinds, green)
     for index, spot in enumerate(area.spots(rng, count, depths, spread)):
         (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
-        moves = spot.depth_m < STILL_BEYOND * unit_m
+        moves = spot.depth_m < NO_SWAY_BEYOND * unit_m
         motion = sway_of(rng, shape, uniform(rng, *sway)) if moves else None
         placement.stand(
             f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk * scale_m, deformation=motion
@@ -132,6 +133,7 @@ def grass(
     colors: Sequence[PaletteRange] = (FOLIAGE,),
     scales: Range = (0.06, 0.2),
 ) -> None:
+    """Swaying tufts of grass near the camera."""
     kinds = [GrassTuft.sample(rng) for _ in range(4)]
     foliage = [leaves(kind) for kind in colors]
     plants(
@@ -158,12 +160,13 @@ def mushrooms(
     scales: Range,
     glow: float,
 ) -> None:
+    """Mushrooms of a few kinds; `glow` is the emission of their caps (`Material.emission`)."""
     placement, unit_m = area.placement, area.unit_m
     kinds = [Mushroom.sample(rng) for _ in range(5)]
     middle_m, seen_m = math.sqrt(scales[0] * scales[1]) * unit_m, 1.5 * depths[0] * unit_m
     pale = placement.new_material(rng, horn, middle_m, seen_m)
     caps = [placement.new_material(rng, cap, middle_m, seen_m, emission=glow) for _ in range(3)]
-    outfits = _outfits(rng, kinds, caps)
+    outfits = _pairings(rng, kinds, caps)
     for index, spot in enumerate(area.spots(rng, count, depths, 1.1)):
         kind, top = choose(rng, outfits)
         worn = {"stem": pale, "cap": top}
@@ -185,7 +188,7 @@ def boulders(
     kinds = [replace(Boulder.sample(rng), detail=3) for _ in range(4)]
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
     worn = [placement.new_material(rng, sampler, middle_m, 1.8 * depths[0] * unit_m) for sampler in stones]
-    outfits = _outfits(rng, kinds, worn)
+    outfits = _pairings(rng, kinds, worn)
     for index, spot in enumerate(area.spots(rng, count, depths, 1.15)):
         (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
         sunk_m = scale_m * uniform(rng, *sunk)

@@ -15,6 +15,7 @@ KEY_SPACING_FRAMES = 8.0
 
 
 def vector(values: NDArray[np.float64]) -> Vector:
+    """A plain tuple of three numbers."""
     x, y, z = (float(value) for value in values)
     return (x, y, z)
 

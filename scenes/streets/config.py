@@ -18,13 +18,13 @@ class DrivingConfig(FamilyConfig):
     focal_lengths_mm: tuple[float, ...] = (15.0, 35.0)
     """Focal lengths to choose from, on a sensor 32 mm wide."""
     baseline_m: Range = (0.5, 1.0)
-    """Distance between the eyes; made smaller where the road would come nearer than allowed."""
+    """Distance between the cameras; made smaller where the road would come nearer than allowed."""
     largest_disparity_share: float = 0.2
     """Nothing in view has a larger disparity, as a share of the image width: 192 px at 960."""
     clearance_m: float = 1.0
-    """Distance that everything but the road keeps from both eyes at all times."""
+    """Distance that everything but the road keeps from both cameras at all times."""
     camera_height_m: Range = (1.4, 2.2)
-    """Height of the eyes above the road."""
+    """Height of the cameras above the road."""
     pitch_deg: Range = (-3.0, 5.0)
     """How far the camera looks down."""
     roll_deg: Range = (-2.0, 2.0)

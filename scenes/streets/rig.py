@@ -46,6 +46,7 @@ class Drive:
     view_m: float
 
     def s(self, time_frames: float) -> float:
+        """s of the rig at an instant, metres."""
         return self.speed_m * (time_frames - (self.frames - 1) / 2)
 
     @property
@@ -60,6 +61,7 @@ class Drive:
 
 
 def sample_drive(rng: np.random.Generator, config: DrivingConfig) -> Drive:
+    """Draw the street's course, its lanes, and how the rig drives along it."""
     fast = chance(rng, config.fast_share)
     speed = uniform(rng, *(config.fast_m if fast else config.slow_m))
     backwards = chance(rng, config.backwards_share)

@@ -58,16 +58,20 @@ class Pavement:
         return True
 
     def near_kerb(self, metres: float) -> float:
+        """t at a distance from the kerb."""
         return self.side.sign * (self.side.kerb_m + metres)
 
     def near_wall(self, metres: float) -> float:
+        """t at a distance from the pavement's far edge."""
         return self.side.sign * (self.side.edge_m - metres)
 
     @property
     def width_m(self) -> float:
+        """From the kerb to the far edge."""
         return self.side.edge_m - self.side.kerb_m
 
     def name(self, what: str, number: int) -> str:
+        """A name for a thing on this pavement, different on both."""
         return f"{what} {'LR'[self.side.sign < 0]}{number}"
 
 

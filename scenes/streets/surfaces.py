@@ -11,7 +11,7 @@ from scenes.appearance import street_materials
 from scenes.placement.assembly import Assembly, anchored_object
 from scenes.random_draws import chance, integer, uniform
 from scenes.shapes.anchored import MetricShape
-from scenes.shapes.street.road import Course, Field, Kerb, RoadMarkings, RoadStrip, Stripe
+from scenes.shapes.street.road import Course, Kerb, LevelGround, RoadMarkings, RoadStrip, Stripe
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive
@@ -68,7 +68,7 @@ def lay_ground(
             _strip(course, outer - 0.05 * side.sign, reach, top - 0.02),
             _land(rng, side, lawn, paving),
         )
-    _lay(scene, "plain", Field(course.start_m - _LAND_M, course.end_m + _LAND_M, _LAND_M, -0.3), lawn)
+    _lay(scene, "plain", LevelGround(course.start_m - _LAND_M, course.end_m + _LAND_M, _LAND_M, -0.3), lawn)
     return Ground(crossings, kerb_height - 0.006)
 
 

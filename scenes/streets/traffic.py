@@ -63,10 +63,12 @@ class Fleet:
     large_share: float
 
     def draw(self, rng: np.random.Generator) -> Model:
+        """A random model; a large one in `large_share` of the draws."""
         return choose(rng, self.large if self.large and chance(rng, self.large_share) else self.cars)
 
 
 def sample_fleet(rng: np.random.Generator, scene: Assembly, config: DrivingConfig, lit: bool) -> Fleet:
+    """Draw the models of vehicles of a scene; `lit` switches their lamps on."""
     shared = {
         "glass": scene.material(street_materials.car_glass(rng)),
         "trim": scene.material(street_materials.black_plastic()),

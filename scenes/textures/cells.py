@@ -28,7 +28,7 @@ from scenes.random_draws import integer, new_seed, uniform
 from scenes.spec import Texture
 
 
-def nearest_seeds(
+def cellular_noise(
     rng: np.random.Generator, x: Field, y: Field, cells: int, jitter: float
 ) -> tuple[NDArray[np.int32], Field, Field]:
     """Worley's cellular noise on a periodic jittered grid of cells x cells points.
@@ -88,7 +88,7 @@ class VoronoiCells(Texture):
         bend = np.float32(self.warp / self.cells)
         x = x + bend * spectral_noise(rng, self.size, 1.5, self.cells / 2)
         y = y + bend * spectral_noise(rng, self.size, 1.5, self.cells / 2)
-        nearest, first, second = nearest_seeds(rng, x, y, self.cells, self.jitter)
+        nearest, first, second = cellular_noise(rng, x, y, self.cells, self.jitter)
         place = rng.uniform(0.0, 1.0, self.cells**2).astype(np.float32)[nearest]
         picture = colorize(place, self.palette)
         picture = picture * (1 + np.float32(0.12) * spectral_noise(rng, self.size, 0.9, 3))
@@ -130,7 +130,7 @@ class Cobblestones(Texture):
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
         x, y = unit_grid(self.size)
-        nearest, first, second = nearest_seeds(rng, x, y, self.cells, self.jitter)
+        nearest, first, second = cellular_noise(rng, x, y, self.cells, self.jitter)
         gap = second - first
         height = np.tanh(gap * np.float32(2.5)) - np.float32(self.roundness) * first**2
         slope_x = np.roll(height, -1, 1) - np.roll(height, 1, 1)

@@ -52,6 +52,7 @@ class RoughBark(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette, lichen: Srgb) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),
@@ -101,6 +102,7 @@ class Litter(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),
@@ -173,6 +175,7 @@ class Strata(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette, dust: Srgb) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),
@@ -227,6 +230,7 @@ class Hair(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette, marking: Srgb) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),
@@ -273,6 +277,7 @@ class LeafVeins(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette, vein: Srgb) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),

@@ -27,7 +27,7 @@ from scenes.appearance.painting import (
 )
 from scenes.random_draws import choose, integer, new_seed, uniform
 from scenes.spec import Texture
-from scenes.textures.cells import nearest_seeds
+from scenes.textures.cells import cellular_noise
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Asphalt(Texture):
         light = 1 + np.float32(self.stones) * grit + np.float32(self.patches) * slow
         x, y = unit_grid(self.size)
         bend = np.float32(0.06) * spectral_noise(rng, self.size, 1.4, 3)
-        _, first, second = nearest_seeds(rng, x + bend, y - bend, self.cells, 0.9)
+        _, first, second = cellular_noise(rng, x + bend, y - bend, self.cells, 0.9)
         broken = smooth_step(
             slow + np.float32(0.7) * np.roll(slow, self.size // 3, 0), 1.2 - 2 * self.cracks, 0.8
         )

@@ -75,6 +75,7 @@ class AssetPool:
         return bool(self.meshes or self.textures or self.environments)
 
     def of_split(self, split: str) -> AssetPool:
+        """The files that a split may use."""
         return AssetPool(
             *(
                 tuple(asset for asset in kind if asset.split == split)

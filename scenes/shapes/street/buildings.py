@@ -63,6 +63,7 @@ class HouseDesign:
 
     @property
     def width(self) -> float:
+        """Length of the front, metres."""
         return self.bays * self.bay
 
     @property

@@ -54,9 +54,11 @@ class PersonDesign:
 
     @property
     def scale(self) -> float:
+        """Size relative to a person of 1.75 m."""
         return self.height / 1.75
 
     def hip(self, side: float) -> NDArray[np.float64]:
+        """(3,) the left (1) or right (-1) hip joint of the unscaled body, metres."""
         return np.array((0.0, 0.095 * side * self.girth, 0.9))
 
     def leg(self, side: float) -> NDArray[np.float64]:

@@ -46,6 +46,7 @@ class Course:
 
     @property
     def end_m(self) -> float:
+        """s of the last heading."""
         return self.start_m + self.spacing_m * (len(self.headings_deg) - 1)
 
     @cached_property
@@ -81,6 +82,7 @@ class Course:
         )
 
     def place(self, s_m: float, t_m: float, z_m: float = 0.0) -> Vector:
+        """The world point at street coordinates (s, t) and a height."""
         x, y = self.point(s_m, t_m)
         return (float(x), float(y), z_m)
 
@@ -251,7 +253,7 @@ class Kerb(MetricShape):
 
 
 @dataclass(frozen=True)
-class Field(MetricShape):
+class LevelGround(MetricShape):
     """Level land along the x axis, a slab a metre thick."""
 
     from_m: float

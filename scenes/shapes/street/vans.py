@@ -66,6 +66,7 @@ class VanDesign:
 
     @property
     def track(self) -> float:
+        """Distance from the middle to the middle of a wheel, metres."""
         return self.width / 2 - 0.15
 
     @property
@@ -98,7 +99,8 @@ class VanDesign:
         return (self.length / 2 - self.nose, {"van": 1.12, "lorry": 1.45, "bus": 1.05}[self.kind])
 
 
-def any_van(rng: np.random.Generator) -> VanDesign:
+def sample_van_design(rng: np.random.Generator) -> VanDesign:
+    """A random van, lorry or bus."""
     return VanDesign.sample(rng, choose(rng, ["van", "lorry", "bus"]))
 
 
@@ -127,7 +129,7 @@ class VanBody(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_van(rng))
+        return cls(sample_van_design(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -171,7 +173,7 @@ class VanGlass(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_van(rng))
+        return cls(sample_van_design(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -225,7 +227,7 @@ class VanTrim(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_van(rng))
+        return cls(sample_van_design(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -256,7 +258,7 @@ class VanLamps(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_van(rng), bool(rng.random() < 0.5))
+        return cls(sample_van_design(rng), bool(rng.random() < 0.5))
 
     def surface(self) -> Surface:
         design = self.design

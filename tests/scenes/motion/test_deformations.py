@@ -63,7 +63,7 @@ def test_parts_of_one_body_move_as_one_whatever_their_mesh_coordinates() -> None
 
 @settings(max_examples=12, deadline=None)
 @given(seed=seeds, time=st.floats(-5.0, 200.0))
-def test_the_lowest_foot_of_a_figure_stays_on_the_ground(seed: int, time: float) -> None:
+def test_the_lowest_foot_of_a_character_stays_on_the_ground(seed: int, time: float) -> None:
     body = character(seed)
     if not body.feet:
         return
@@ -81,7 +81,7 @@ def _step(motion: Deformation, rest: NDArray[np.float64], time: float, by: float
 
 @settings(max_examples=10, deadline=None)
 @given(seed=seeds)
-def test_figures_move_smoothly_and_not_far(seed: int) -> None:
+def test_characters_move_smoothly_and_not_far(seed: int) -> None:
     body = character(seed)
     part = body.parts[0]
     motion = body.deformation(part)
@@ -99,7 +99,7 @@ def test_figures_move_smoothly_and_not_far(seed: int) -> None:
 
 @settings(max_examples=10, deadline=None)
 @given(seed=seeds)
-def test_a_figures_skin_is_stretched_only_about_its_joints(seed: int) -> None:
+def test_a_characters_skin_is_stretched_only_about_its_joints(seed: int) -> None:
     body = character(seed)
     part = body.parts[0]
     mesh, motion = part.shape.mesh(), body.deformation(part)
