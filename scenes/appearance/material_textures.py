@@ -1,4 +1,7 @@
-"""What things in landscapes are made of: textures of a stuff in colours of that stuff."""
+"""Textures of the materials of landscapes and characters, in the colours of those materials.
+
+Each function here is a `TextureSampler`, or returns one for a range of colours.
+"""
 
 from __future__ import annotations
 
@@ -45,50 +48,50 @@ _Pattern = Dots | Gradient | Labyrinth | Stripes | Weave
 def leaves(colors: PaletteRange = FOLIAGE) -> TextureSampler:
     """Leaves: veined, or blotched where they are too small to show veins."""
 
-    def draw(rng: np.random.Generator, size: int) -> Texture:
+    def sample(rng: np.random.Generator, size: int) -> Texture:
         palette = sample_palette_in(rng, colors, 4)
         if rng.random() < 0.6:
             return LeafVeins.of(rng, size, palette[:3], palette[3])
         return _noise(rng, size, palette)
 
-    return draw
+    return sample
 
 
 def ground(colors: PaletteRange, under: PaletteRange = EARTH) -> TextureSampler:
-    """Grass, litter, moss or snow over soil: strokes or clouds."""
+    """Grass, litter, moss or snow over soil of the colours `under`."""
 
-    def draw(rng: np.random.Generator, size: int) -> Texture:
+    def sample(rng: np.random.Generator, size: int) -> Texture:
         palette = (sample_palette_in(rng, under, 2)[0], *sample_palette_in(rng, colors, 4))
         return Litter.of(rng, size, palette) if rng.random() < 0.65 else _noise(rng, size, palette)
 
-    return draw
+    return sample
 
 
 def grains(colors: PaletteRange) -> TextureSampler:
-    """Sand, snow, dust: soft clouds and grit of one tone."""
+    """Sand, snow, dust: soft clouds and grit of one colour."""
 
-    def draw(rng: np.random.Generator, size: int) -> Texture:
+    def sample(rng: np.random.Generator, size: int) -> Texture:
         noise = FractalNoise.sample(rng, size)
         return replace(
             noise, palette=sample_palette_in(rng, colors, 4), slope=uniform(rng, 0.5, 1.0), ridges=False
         )
 
-    return draw
+    return sample
 
 
 def rock(colors: PaletteRange = ROCK, dust: PaletteRange = MOSS) -> TextureSampler:
     """Layered or massive rock with moss, sand or snow in its hollows; `dust` are the colours of those."""
 
-    def draw(rng: np.random.Generator, size: int) -> Texture:
+    def sample(rng: np.random.Generator, size: int) -> Texture:
         return Strata.of(rng, size, sample_palette_in(rng, colors, 4), sample_palette_in(rng, dust, 1)[0])
 
-    return draw
+    return sample
 
 
 def masonry(colors: PaletteRange) -> TextureSampler:
     """Dressed stone: blocks, rubble or plain weathered stone."""
 
-    def draw(rng: np.random.Generator, size: int) -> Texture:
+    def sample(rng: np.random.Generator, size: int) -> Texture:
         palette = sample_palette_in(rng, colors, 4)
         kind = rng.random()
         if kind < 0.35:
@@ -97,7 +100,7 @@ def masonry(colors: PaletteRange) -> TextureSampler:
             return replace(Cobblestones.sample(rng, size), palette=palette)
         return rock(colors)(rng, size)
 
-    return draw
+    return sample
 
 
 def paving(rng: np.random.Generator, size: int) -> Texture:
@@ -142,7 +145,7 @@ def timber(rng: np.random.Generator, size: int) -> Texture:
 
 
 def fur(rng: np.random.Generator, size: int) -> Texture:
-    """Half of them the colours of real animals, half of none."""
+    """Fur: half of it in the colours of real animals, half in vivid ones."""
     colors = choose(rng, (HAIR, VIVID))
     palette, marking = (
         sample_palette_in(rng, colors, 4),
@@ -183,7 +186,7 @@ def leather(rng: np.random.Generator, size: int) -> Texture:
 
 
 def cloth(rng: np.random.Generator, size: int) -> Texture:
-    """Woven, striped, spotted or plain stuff of one hue."""
+    """Woven, striped, spotted or plain cloth of one hue."""
     palette = sample_palette_in(rng, CLOTH, 3, hue_spread_deg=40.0)
     kind = choose(rng, (Weave, Stripes, Dots, Gradient, Labyrinth, None), (0.3, 0.15, 0.1, 0.1, 0.1, 0.25))
     if kind is None:
@@ -211,7 +214,9 @@ def horn(rng: np.random.Generator, size: int) -> Texture:
 
 
 SNOWY = rock(ROCK, SNOW)
+"""Rock with snow in its hollows."""
 DESERT_ROCK = rock(RED_ROCK, SAND)
+"""Red rock with sand in its hollows."""
 CHARACTER_TEXTURES: dict[str, TextureSampler] = {
     "fur": fur,
     "hide": hide,
@@ -223,7 +228,7 @@ CHARACTER_TEXTURES: dict[str, TextureSampler] = {
     "horn": horn,
     "eye": eye,
 }
-"""What figures are made of."""
+"""Texture samplers by the names of `scenes.landscapes.characters.CharacterPart.material`."""
 
 
 def _noise(rng: np.random.Generator, size: int, palette: Palette, low_cycles: float = 3.0) -> Texture:

@@ -1,4 +1,4 @@
-"""Random materials: which picture a surface wears, how finely, and how it answers light."""
+"""Materials: which texture a surface has, at which scale, and how it reflects light."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ FINISHES: dict[str, Finish] = {
     "glass": Finish(share=0.03, roughness=(0.0, 0.15), specular=(0.5, 0.5), transmission=(0.5, 0.9)),
     "glowing": Finish(share=0.03, emission=(0.2, 1.5)),
 }
-"""Mostly diffuse, which is cheap to render; every other kind a network will meet, in smaller numbers."""
+"""Kinds of surfaces by name: mostly diffuse ones, which are cheap to render, and fewer of all others."""
 
 TEXEL_PX: Range = (0.9, 2.2)
-"""Image pixels that one texture pixel covers where the surface is seen: below 1 detail aliases, far above
-it smears."""
+"""Image pixels that one texture pixel covers where the surface is seen: below 1, detail aliases; far above 1,
+it blurs."""
 
 
 def sample_texture(rng: np.random.Generator, size: int) -> Texture:
@@ -69,7 +69,8 @@ def texture_repeats(rng: np.random.Generator, unit_px: float, size: int, texel_p
 def sample_material(rng: np.random.Generator, unit_px: float, texture_size: int = 256) -> Material:
     """A random material for a surface on which one unit of texture coordinates spans `unit_px` pixels.
 
-    The texture is repeated so that its pixels and the image's are of about the same size (`TEXEL_PX`).
+    The texture, `texture_size` pixels wide, is repeated so that its pixels and the image's are of about the
+    same size (`TEXEL_PX`).
     """
     finish = choose(rng, list(FINISHES.values()), [finish.share for finish in FINISHES.values()])
     repeats = texture_repeats(rng, unit_px, texture_size, TEXEL_PX)

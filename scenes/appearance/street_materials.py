@@ -1,4 +1,4 @@
-"""Materials as streets have them: which picture, at which scale, how it answers light."""
+"""Materials of streets, for metric shapes: a texture, its scale in metres, and how it reflects light."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WINDOW_FRAMES: tuple[Srgb, ...] = (
     (120, 84, 56),
     (64, 72, 84),
 )
-"""White mostly, dark green, brown, grey."""
+"""Colours of window frames: mostly white; dark green, brown, grey."""
 
 
 def asphalt(rng: np.random.Generator) -> Material:
@@ -69,7 +69,7 @@ def road_paint(rng: np.random.Generator, yellow: bool = False) -> Material:
 
 
 def wall(rng: np.random.Generator, plastered: float) -> Material:
-    """Brick or plaster; `plastered` is the share of the latter."""
+    """Brick or plaster; `plastered` is the share of plaster."""
     if chance(rng, plastered):
         return tiled(Plaster.sample(rng, 256), uniform(rng, 2.5, 4.0))
     hue, chroma, base = choose(
@@ -128,7 +128,7 @@ def windows(
 
 
 def shop_window(rng: np.random.Generator, lit: float) -> Material:
-    """Goods behind glass."""
+    """Goods behind glass; glowing where `lit` is above 0."""
     kinds: list[type[Texture]] = [DeadLeaves, BlurredShapes, Layered]
     goods = tiled(choose(rng, kinds).sample(rng, 128), uniform(rng, 2.0, 4.0))
     if lit:
@@ -150,7 +150,7 @@ def roof(rng: np.random.Generator) -> Material:
 
 
 def skyline(rng: np.random.Generator) -> Material:
-    """The front of a large building far away."""
+    """The facade of a large building far away."""
     color, frame = (
         shade(uniform(rng, 0.5, 0.85), uniform(rng, 0.0, 0.04), uniform(rng, 30.0, 100.0)),
         shade(0.8, 0.01, 90.0),
@@ -161,7 +161,7 @@ def skyline(rng: np.random.Generator) -> Material:
 
 
 def car_paint(rng: np.random.Generator) -> Material:
-    """White, greys and blacks mostly, as on real roads, and every other colour."""
+    """The paint of a vehicle: half of them white, grey or black, the others of any colour."""
     lightness = uniform(rng, 0.18, 0.96)
     vivid = chance(rng, 0.5)
     hue = choose(rng, [28.0, 255.0, 250.0, 140.0, 90.0, 60.0, 200.0]) + uniform(rng, -12.0, 12.0)
@@ -189,7 +189,7 @@ def black_plastic() -> Material:
 
 
 def lamp(color: Srgb, lit: float) -> Material:
-    """The glass of a lamp: shiny, and glowing when it is lit."""
+    """The glass of a lamp: shiny, with the emission `lit`."""
     return replace(plain(color, roughness=0.15, specular=0.6), emission=lit)
 
 
@@ -227,7 +227,7 @@ def metal_paint(rng: np.random.Generator) -> Material:
 
 
 def fence(rng: np.random.Generator, kind: str) -> Material:
-    """For a kind of `Fence`."""
+    """For a style of `scenes.shapes.street.boundaries.Fence`."""
     if kind == "wall":
         return wall(rng, 0.3)
     return wood(rng) if kind in ("boards", "picket") and chance(rng, 0.6) else metal_paint(rng)

@@ -1,6 +1,6 @@
-"""Drives through streets, as in the Driving set (Mayer et al. 2016) and KITTI.
+"""Drives through streets, after the Driving set (Mayer et al. 2016) and KITTI.
 
-A street winds between houses, gardens or parks; a stereo rig drives along one of its lanes, forwards or
+A stereo rig drives along a lane of a street that winds between houses, gardens or parks, forwards or
 backwards, fast or slow, among other vehicles, parked cars and people on the pavements.
 
 The disparity of the road at the lower edge of a 16:9 image is about 0.28 * baseline / camera height as a share

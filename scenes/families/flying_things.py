@@ -1,7 +1,7 @@
-"""Things flying in front of a cluttered landscape: the recipe of FlyingThings3D (Mayer et al. 2016).
+"""Things flying in front of a cluttered landscape, after FlyingThings3D (Mayer et al. 2016).
 
-A large textured ground, static objects standing about on it, and in front of them objects that fly on smooth
-paths, all seen by a moving stereo camera. Every length scales with the nearest allowed depth, so the images
+Static objects stand on a large textured ground; in front of them other objects fly on smooth paths. A moving
+stereo camera sees them all. Every length scales with the nearest allowed depth, so the images
 of a rig with a small baseline look like those of one with a large baseline.
 """
 
@@ -42,7 +42,7 @@ from scenes.textures.sky import Sky
 from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture
 
 _SHAPE_FILL = 1.8
-"""Mean projected area of the shapes, in squares of their half extent; measured over 300 draws."""
+"""Mean projected area of the shapes, in squares of their half extents; measured over 300 draws."""
 _REACH = 1.35
 """Distance from a shape's centre to its farthest point, in half extents, which one in ten exceeds."""
 
@@ -80,7 +80,7 @@ class FlyingThingsConfig(FamilyConfig):
     pitch_deg: Range = (-2.0, 12.0)
     """How far the camera looks down."""
     roll_deg: Range = (-4.0, 4.0)
-    """How far the camera leans."""
+    """Roll of the camera."""
     suns: Count = (1, 2)
     area_lights: Count = (0, 4)
     sky_strength: Range = (0.7, 1.8)
@@ -91,9 +91,9 @@ class FlyingThingsConfig(FamilyConfig):
     """Diameter of the final pass's blur of the horizon, as a share of the image width."""
 
     user_share: float = 0.5
-    """Share of the flying objects, of their textures and of the skies that are the user's own, where given."""
+    """Share of the flying objects, of their textures and of the skies that are user assets, where there are any."""
     assets: AssetPool = field(default_factory=AssetPool)
-    """The user's own files; filled in from the recipe's, for each split its own."""
+    """The user assets of the split; `with_assets` fills them in."""
     complexity: float = 1.0
     """0 few things of plain shapes, 1 as many and as complicated as the other ranges say."""
 
@@ -101,7 +101,10 @@ class FlyingThingsConfig(FamilyConfig):
         return replace(self, assets=assets)
 
     def within_disparities(self, least_px: float, greatest_px: float) -> FlyingThingsConfig:
-        """The background stands where it did between farthest and nearest, on a logarithmic scale."""
+        """This config for a range of disparities, pixels; the background keeps its share of the logarithmic range.
+
+        Raises ValueError for a least disparity that is not above 0.
+        """
         if least_px <= 0:
             raise ValueError(f"flying_things need a least disparity above 0, got {least_px:g}")
         low, high = self.disparity_share
@@ -111,7 +114,7 @@ class FlyingThingsConfig(FamilyConfig):
         return replace(self, disparity_share=(least, greatest), background_disparity_share=(near, far))
 
     def draw_user_asset(self, rng: np.random.Generator, among: tuple[Asset, ...]) -> Asset | None:
-        """One of the user's files of a kind, or None for one of the generator's own; draws only if there are any."""
+        """One of the user's files, or None for a procedural one; draws from `rng` only if there are any files."""
         return choose(rng, among) if among and chance(rng, self.user_share) else None
 
     def at_complexity(self, complexity: float) -> FlyingThingsConfig:
@@ -228,7 +231,7 @@ def _final(rng: np.random.Generator, rig: _Rig) -> FinalPass:
 
 
 def _sample_land(rng: np.random.Generator, rig: _Rig) -> _Land:
-    """Gently rolling land, below everything the lower edge of the image may show nearer than allowed."""
+    """Gently rolling land, so low that the image's lower edge shows none of it nearer than allowed."""
     half_m = rig.farthest_m
     terrain = Terrain(
         relief=uniform(rng, 0.0005, 0.006),
@@ -256,9 +259,9 @@ def _ground(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -
 
 
 _BACKGROUND_SHAPES: dict[str, float] = {"Box": 0.3, "DeformedCylinder": 0.2, "Cylinder": 0.08}
-"""Shares of the background's plain kinds; the rest is of any kind."""
+"""Shares of these kinds among the background's shapes; the rest is of any kind."""
 _PLAIN_SHAPES: dict[str, float] = {"Box": 0.4, "Cylinder": 0.3, "Superquadric": 0.3}
-"""What all flying objects are at complexity 0, fewer and fewer up to 1."""
+"""Kinds of all flying objects at complexity 0; their share falls to none at complexity 1."""
 
 
 def _sample_shape(rng: np.random.Generator, plain: dict[str, float] | None = None) -> Shape:
@@ -359,7 +362,7 @@ def _flyer(
 
 
 def _kept_away(motion: Trajectory, reach_m: float, rig: _Rig) -> Trajectory:
-    """The motion, moved away from the camera as far as it takes to stay behind the nearest depth."""
+    """The motion, moved away from the camera so far that the object stays behind the nearest depth."""
     forward = -rig.pose[:3, 2]
     shortfall = -math.inf
     for time in exposure_times(rig.config.frames):

@@ -1,8 +1,8 @@
-"""Soft, furry creatures among plants: the world of Monkaa (Mayer et al. 2016), with creatures of our own.
+"""Soft, furry creatures among plants, after Monkaa (Mayer et al. 2016), with procedural creatures.
 
-One or more creatures with limbs, tails and eyes, walking or gesturing, in a jungle, a meadow, a grove of
-giant mushrooms or a cave; plants that sway; coloured lamps; a camera that drifts. Lengths are in units of
-the distance of the creature the scene is about, a few metres.
+Creatures with limbs, tails and eyes walk or gesture in a jungle, a meadow, a grove of giant mushrooms or a
+cave; plants sway, lamps are coloured, the camera drifts. Lengths are in units of the distance of the main
+creature, a few metres.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ from scenes.textures.sky import Sky
 from scenes.user_assets.replacement import Replaceable
 
 PLACES = ("jungle", "meadow", "mushrooms", "cave")
+"""Kinds of places; a scene notes the index of its own."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +57,9 @@ class MonkaaConfig(LandscapeConfig):
     crowd = ("creatures", "fur_locks", "undergrowth", "grass_tufts", "trees", "boulders")
 
     creatures: Count = (1, 4)
-    """Creatures per scene; the first is what the scene is about."""
+    """Creatures per scene; the first is the main one, at which the camera looks."""
     focus_distance_m: Range = (2.5, 6.0)
-    """Distance of that creature."""
+    """Distance of the main creature."""
     fur_locks: Count = (2000, 5500)
     """Locks of fur on a furry creature; three in four are furry, the others have bare skin."""
     undergrowth: Count = (30, 60)
@@ -77,11 +78,11 @@ class MonkaaConfig(LandscapeConfig):
 
 @dataclass(frozen=True)
 class _Plan:
-    """What is decided before anything is placed."""
+    """Decisions that come before anything is placed."""
 
     place: str
     depth_m: float
-    """Of the creature the scene is about; the unit of all lengths."""
+    """Depth of the main creature; the unit of all lengths."""
     size_m: float
     """Its height."""
     placement: GroundPlacement
@@ -95,7 +96,7 @@ def sample_monkaa(rng: np.random.Generator, config: MonkaaConfig) -> Scene:
     placement.lay_ground(rng, _floor(plan.place), 1.5 * plan.depth_m)
     cave = _cave(rng, plan) if plan.place == "cave" else None
     creatures = _creatures(rng, config, plan)
-    area = VegetationArea(placement, plan.depth_m, anywhere if cave is None else cave.holds)
+    area = VegetationArea(placement, plan.depth_m, anywhere if cave is None else cave.contains)
     _FURNISH[plan.place](rng, config, plan)
     foliage = [leaves() for _ in range(4)]
     if chance(rng, 0.5):
@@ -156,7 +157,7 @@ def _floor(place: str) -> TextureSampler:
 
 
 def _creatures(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> int:
-    """The one the scene is about before the camera, the others about it; returns how many there are."""
+    """The main creature before the camera, the others about it; returns how many were placed."""
     placement, placed = plan.placement, 0
     for index in range(integer(rng, *config.creatures)):
         furry = chance(rng, 0.75)
@@ -180,7 +181,7 @@ def _creatures(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> i
         materials = _creature_materials(
             rng, placement, character, fur if furry else hide, scale_m, spot.depth_m
         )
-        # The one the scene is about stands where it must: the camera was set up for it.
+        # The main creature is not checked: the camera was set up for it.
         placed += place_character(
             placement, f"creature {index}", character, materials, spot, scale_m, checked=index > 0
         )
@@ -265,15 +266,15 @@ _CAVE_RADIUS = 1.35
 
 @dataclass(frozen=True)
 class _Tunnel:
-    """Where the cave's room is."""
+    """The space inside a cave."""
 
     radius_m: float
     end_m: float
     """y of its far mouth."""
     bend_m: float
 
-    def holds(self, spot: Spot) -> bool:
-        """Whether a spot is well inside, or well out in the open."""
+    def contains(self, spot: Spot) -> bool:
+        """Whether a spot is well inside the cave, or well outside of it."""
         x, y, _ = spot.ground_m
         if y > self.end_m + self.radius_m:
             return True
@@ -322,7 +323,7 @@ def _thicket(rng: np.random.Generator, area: VegetationArea, count: int, depths:
 
 
 def _vines(rng: np.random.Generator, plan: _Plan, count: int) -> None:
-    """Cords that come down from above the image."""
+    """Vines that hang down from above the image."""
     placement, d = plan.placement, plan.depth_m
     shapes = [Vine.sample(rng) for _ in range(3)]
     green = [placement.new_material(rng, leaves(), 0.5 * d, 1.2 * d) for _ in range(2)]

@@ -1,8 +1,9 @@
-"""Figures in wide landscapes: the world of MPI Sintel (Butler et al. 2012), with characters of our own.
+"""Characters in wide landscapes, after MPI Sintel (Butler et al. 2012), with procedural characters.
 
-Robed or booted people, now and then with a beast, in mountains, snow, desert, a bamboo forest, a small
-town or among ruins; eroded land up to the horizon; fog, motion blur and defocus in the final pass. Lengths
-are metres, a person being about 1.75 m tall; the distance follows from how large the person is to appear.
+People in robes or boots, some with an animal, stand or walk in mountains, snow, desert, a bamboo forest, a
+small town or among ruins. Eroded land reaches to the horizon; the final pass has fog, motion blur and
+defocus. Lengths are metres, a person is about 1.75 m tall; the distance follows from how large the main
+person shall appear.
 """
 
 from __future__ import annotations
@@ -54,6 +55,7 @@ from scenes.textures.sky import Sky
 from scenes.user_assets.replacement import Replaceable
 
 PERSON_M = 1.75
+"""Height of a person."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class SintelConfig(LandscapeConfig):
     focal_mm: Range = (26.0, 60.0)
     """Focal length on a sensor 32 mm wide."""
     focus_disparity_share: Range = (0.01, 0.036)
-    """Disparity of the person the scene is about, as a share of the image width (0.01 is 10 px at 960);
+    """Disparity of the main person, as a share of the image width (0.01 is 10 px at 960);
     it sets the baseline."""
     focus_height_share: Range = (0.35, 0.8)
     """Height of that person, as a share of the image height."""
@@ -74,7 +76,7 @@ class SintelConfig(LandscapeConfig):
     fog_share: float = 0.6
     """Share of the scenes with fog in the final pass, 0..1."""
     people: Count = (1, 4)
-    """People per scene; the first is what the scene is about."""
+    """People per scene; the first is the main one, at which the camera looks."""
     beast_share: float = 0.3
     """Share of the scenes with an animal beside the people, 0..1."""
     trees: Count = (14, 30)
@@ -94,7 +96,7 @@ class _Place:
     """A kind of landscape."""
 
     share: float
-    """How many of all scenes are such, relative to the others."""
+    """How many scenes are of this kind, relative to the others."""
     floor: TextureSampler
     stones: TextureSampler
     relief: Range
@@ -104,18 +106,18 @@ class _Place:
     clearing: Range
     """Radius of the level middle, relative to half the land's side."""
     rockiness: float
-    """Share of the configured number of rocks that lie about."""
+    """Share of the configured number of rocks that this kind of landscape has."""
     furnish: Callable[[np.random.Generator, SintelConfig, _Plan], None]
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """What is decided before anything is placed."""
+    """Decisions that come before anything is placed."""
 
     name: str
     place: _Place
     depth_m: float
-    """Of the person the scene is about."""
+    """Depth of the main person."""
     placement: GroundPlacement
 
     @property
@@ -180,7 +182,7 @@ def _sample_land(rng: np.random.Generator, place: _Place, depth_m: float) -> Lan
 
 
 def _people(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> int:
-    """The one the scene is about, others about it, sometimes a beast; returns how many people there are."""
+    """The main person, others about them, sometimes an animal; returns how many people were placed."""
     placement, d = plan.placement, plan.depth_m
     placed = 0
     for index in range(integer(rng, *config.people)):
@@ -421,7 +423,7 @@ def _colonnade(rng: np.random.Generator, plan: _Plan, stone: TextureSampler) -> 
 
 
 def _lights(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> tuple[Light, ...]:
-    """One sun, often low; sometimes a lamp that fills the shadows of the people."""
+    """One sun, often low; sometimes a lamp that lightens the shadows of the people."""
     placement, d = plan.placement, plan.depth_m
     target = placement.spot(0.0, d).ground_m + np.array((0.0, 0.0, 0.5 * PERSON_M))
     lights: list[Light] = [sample_sun(rng, placement.pose)]

@@ -1,4 +1,4 @@
-"""Stems and the leaves about them: what plants of all kinds are made of."""
+"""Stems, boughs and clouds of leaves: the parts of plants."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def stem(path: Vertices, radius: NDArray[np.float64], sides: int = 7) -> Part:
 def winding_path(
     rng: np.random.Generator, start: Vertices, end: Vertices, wobble: float, points: int
 ) -> Vertices:
-    """(points, 3) from start to end, straying sideways by about `wobble`, not at all at the start."""
+    """A random path (points, 3) from `start` (3,) to `end` (3,) that strays from a line by about `wobble`."""
     share = np.linspace(0.0, 1.0, points)
     waves = np.zeros((points, 3))
     for k in range(3):
@@ -38,7 +38,10 @@ def winding_path(
 def leaf_cloud(
     rng: np.random.Generator, centres: Vertices, radius: NDArray[np.float64], leaves: int, size: float
 ) -> Part:
-    """Pointed leaves on the outside of balls, hanging outward: the crowns of bushes and trees."""
+    """Pointed leaves on balls, hanging outward: the crowns of bushes and trees.
+
+    The balls have centres (N, 3) and radii (N,); there are `leaves` leaves in all, of about the length `size`.
+    """
     owner = rng.integers(0, len(centres), leaves)
     outward = normalized(rng.normal(size=(leaves, 3)) + 0.25 * UP)
     base = centres[owner] + outward * (radius[owner] * rng.uniform(0.55, 1.0, leaves))[:, None]

@@ -1,4 +1,4 @@
-"""Living characters: skeletons of random proportions, the flesh, fur and clothes on them, and how they move.
+"""Characters: skeletons of random proportions, their bodies and fur, and how they move.
 
 A character faces +x, its left is +y, and its feet stand at z = 0. Its coordinates are in body units, about one
 body height.
@@ -24,7 +24,7 @@ from scenes.shapes.nature.creatures import Eyeballs, Limb, SoftBody, iris_repeat
 from scenes.spec import Vector
 
 SKINNED = -1
-"""`carried_by` of a part that is skinned."""
+"""`CharacterPart.carried_by` of a part that is skinned instead of carried by one joint."""
 
 
 @dataclass(frozen=True)
@@ -35,23 +35,23 @@ class CharacterPart:
     material: str
     """Name of what it is made of: fur, skin, cloth, hair, horn, eye, leather or wood."""
     carried_by: int = SKINNED
-    """Joint it follows rigidly, or `SKINNED`."""
+    """Index of the joint it follows rigidly, or `SKINNED`."""
 
 
 @dataclass(frozen=True)
 class Character:
-    """A body that can be put into a scene."""
+    """A body in parts, with its skeleton and its motion."""
 
     parts: tuple[CharacterPart, ...]
     joints: tuple[Joint, ...]
     feet: tuple[int, ...]
     period_frames: float
     stride: float
-    """How far it walks in a frame, in body units; 0 when it stays where it is."""
+    """How far it walks in a frame, in body units; 0 for a character that stays where it is."""
     height: float
-    """Of the highest point at rest, in body units."""
+    """Height of the highest point at rest, in body units."""
     reach: float
-    """Farthest any of it gets from its foot's spot on the ground plan, in body units."""
+    """Largest horizontal distance of any of its points from its anchor over time, in body units."""
 
     def deformation(self, part: CharacterPart) -> Articulated:
         """The motion of one of its parts, in that part's mesh coordinates."""
@@ -68,7 +68,7 @@ class Character:
 
 
 class CharacterBuilder:
-    """A character under construction."""
+    """A character under construction: its joints, and its flesh by groups that each become one mesh."""
 
     def __init__(self) -> None:
         self.joints: list[Joint] = []
@@ -105,14 +105,14 @@ class CharacterBuilder:
         phase: float = 0.0,
         cycles: int = 1,
     ) -> int:
-        """A joint with its flesh."""
+        """Add a joint with its flesh, of the given radii at both ends; returns its index."""
         self.flesh(group, start, end, *radii)
         return self.joint(parent, start, end, sum(radii) / 2, axis, swing_deg, phase, cycles)
 
 
 @dataclass(frozen=True)
 class Gait:
-    """How a character moves."""
+    """How a character moves: amplitudes of its joints in degrees, and the period."""
 
     walks: bool
     leg_deg: float
@@ -137,18 +137,18 @@ def sample_gait(rng: np.random.Generator) -> Gait:
 
 @dataclass(frozen=True)
 class Coat:
-    """What a creature's skin is like."""
+    """The skin of a creature."""
 
     tufts: int
     """Locks of fur; 0 for bare skin."""
     tuft_length: float
     """In body units."""
     cells: int
-    """Grid cells along the body: how finely it is meshed."""
+    """Grid cells along the body's longest side: how finely it is meshed."""
 
 
 def sample_creature(rng: np.random.Generator, coat: Coat) -> Character:
-    """A soft animal that never was: two-legged, four-legged or a crawler."""
+    """A random invented animal: two-legged, four-legged or crawling."""
     plan = choose(rng, (_biped, _quadruped, _crawler), (0.5, 0.35, 0.15))
     return plan(rng, coat)
 
@@ -230,7 +230,7 @@ def _quadruped(rng: np.random.Generator, coat: Coat) -> Character:
 
 
 def _crawler(rng: np.random.Generator, coat: Coat) -> Character:
-    """A row of balls on stubby legs that wriggles."""
+    """A row of balls on stubby legs that wriggles sideways."""
     body, gait = CharacterBuilder(), sample_gait(rng)
     segments, girth = integer(rng, 5, 8), uniform(rng, 0.09, 0.14)
     step = 1.35 * girth
@@ -295,7 +295,7 @@ def _tail(
 def _head(
     rng: np.random.Generator, body: CharacterBuilder, gait: Gait, parent: int, neck: Vector, skull: float
 ) -> int:
-    """Skull, snout, ears, sometimes horns; the eyes sit where `_eyes` puts them."""
+    """Skull, snout, ears, eyes, sometimes horns; returns the joint of the head."""
     x, y, z = neck
     middle = (x + 0.35 * skull, y, z + 0.75 * skull)
     head = body.bone(

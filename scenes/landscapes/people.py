@@ -20,7 +20,10 @@ _HEM = 0.045
 
 
 def sample_person(rng: np.random.Generator, cells: int) -> Character:
-    """A human character of height 1: in a robe, or in tunic, trousers and boots; some with a staff or a hood."""
+    """A random person of height 1, in a robe or in tunic, trousers and boots; some have a staff or a hood.
+
+    `cells` is how finely the body is meshed (`SoftBody.cells`).
+    """
     body, gait = CharacterBuilder(), sample_gait(rng)
     robed = chance(rng, 0.6)
     girth = uniform(rng, 0.085, 0.115)
@@ -110,7 +113,10 @@ def _dressed(
     feet: tuple[int, ...],
     cells: int,
 ) -> Character:
-    """Meshes for every stuff; `carriers` are the joints of the head and of the hand that may hold a staff."""
+    """The person's meshes, one for each material.
+
+    `carriers` are the joints of the head and of the hand that may hold a staff.
+    """
     head, hand = carriers
     folds = uniform(rng, 0.003, 0.008)
     fineness = {"cloth": 1.0, "legs": 0.6, "skin": 0.7, "hair": 0.5, "leather": 0.5}
@@ -142,7 +148,7 @@ def _dressed(
 
 
 def statue(rng: np.random.Generator, character: Character) -> SoftBody:
-    """All of a character's flesh as one body, to be hewn from stone."""
+    """A statue of a character: all its flesh as one body."""
     limbs = [
         limb for part in character.parts if isinstance(part.shape, SoftBody) for limb in part.shape.limbs
     ]

@@ -1,4 +1,4 @@
-"""Land, and a stereo rig that looks over it at something: what families of landscapes start from."""
+"""What the landscape families share: land, a stereo rig that looks over it at a subject, a final pass."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ NEAREST_SHARE = 0.105
 
 @dataclass(frozen=True)
 class LandscapeConfig(FamilyConfig):
-    """What families of landscapes have in common: a camera that looks at a character on open land."""
+    """Settings that the landscape families share: a camera that looks at a character on open land."""
 
     focal_mm: Range = (22.0, 45.0)
     """Focal length on a sensor 32 mm wide."""
     focus_disparity_share: Range = (0.016, 0.045)
-    """Disparity of the character the scene is about, as a share of the image width (0.016 is 15 px at 960);
+    """Disparity of the main character, as a share of the image width (0.016 is 15 px at 960);
     it sets the baseline."""
     focus_height_share: Range = (0.45, 0.8)
     """Height of that character, as a share of the image height."""
@@ -55,7 +55,7 @@ class Land:
 
     shape: Landscape
     half_m: float
-    """Half its side."""
+    """Half the side of the square it covers."""
 
     @cached_property
     def _heights_m(self) -> NDArray[np.float64]:
@@ -85,7 +85,7 @@ class Land:
 
 @dataclass(frozen=True)
 class Focus:
-    """What the scene is about, and how the camera sees it."""
+    """The subject of a scene, and how the camera sees it."""
 
     depth_m: float
     """Distance along the optical axis."""
@@ -95,7 +95,7 @@ class Focus:
     """Its disparity as a share of the image width."""
     camera_height_m: float
     above_deg: float
-    """How far above its middle the camera looks."""
+    """Angle by which the camera looks above the subject's middle."""
     focal_mm: float
     speed_m: float
     """Of the camera, a frame."""
@@ -111,9 +111,9 @@ class Focus:
 def sample_camera(
     rng: np.random.Generator, width: int, height: int, frames: int, land: Land, focus: Focus
 ) -> StereoCamera:
-    """A rig over the origin that looks along +y at the middle of the focus, on a smooth path.
+    """A rig over the world's origin that looks along +y at the subject, on a smooth path.
 
-    Its baseline is such that the focus has its disparity; none of its path comes near the ground.
+    The baseline gives the subject its disparity. The path stays clear of the ground.
     """
     focal_px = focus.focal_mm / 32.0 * width
     baseline_m = focus.disparity_share * width * focus.depth_m / focal_px
@@ -151,7 +151,7 @@ def sample_focus(
     size_m: float,
     camera_height_m: float,
 ) -> Focus:
-    """Look at a character of a size and at a distance from about a height, the character about mid-image.
+    """How a camera sees a subject about mid-image, of a size, at a depth, from about a height.
 
     The camera is raised where the image's lower edge would otherwise show ground nearer than allowed.
     """
@@ -179,7 +179,10 @@ def linear(srgb: tuple[int, int, int]) -> Color:
 def sample_final(
     rng: np.random.Generator, focus_m: float, haze: Color, fog_share: float, visibility_m: Range
 ) -> FinalPass:
-    """A final pass focused on what the scene is about, foggy in `fog_share` of the cases."""
+    """A random final pass, focused on the subject.
+
+    A share `fog_share` of the final passes has fog of the colour `haze`, with a visibility from the given range.
+    """
     return FinalPass(
         shutter_frames=uniform(rng, 0.3, 0.6),
         f_number=log_uniform(rng, 1.8, 11.0),

@@ -1,7 +1,8 @@
-"""Growth and stones on a placement: trees, thickets, undergrowth, grass, mushrooms, boulders.
+"""Vegetation and stones on the ground: trees, undergrowth, grass, mushrooms, boulders.
 
-A few shapes and a few materials of each kind, standing in many places. Lengths are given by `unit_m`, the
-distance of what the scene is about.
+Each function places a few shapes in a few materials at many spots, so that most objects share their meshes.
+Depths and scales are in units of the area's `unit_m`, the distance of the scene's subject; where a spot is
+not allowed, nothing is placed.
 """
 
 from __future__ import annotations
@@ -24,39 +25,39 @@ from scenes.spec import Shape
 
 T = TypeVar("T")
 
-Holds = Callable[[Spot], bool]
+SpotFilter = Callable[[Spot], bool]
 
 
 def anywhere(_: Spot) -> bool:
-    """Whether a spot may be planted: all may."""
+    """A filter that lets all spots through."""
     return True
 
 
 @dataclass(frozen=True)
 class VegetationArea:
-    """Where things grow."""
+    """The part of the ground that vegetation grows on."""
 
     placement: GroundPlacement
     unit_m: float
-    holds: Holds = anywhere
-    """Which spots are to be planted."""
+    contains: SpotFilter = anywhere
+    """Whether a spot belongs to the area."""
 
     def spots(self, rng: np.random.Generator, count: int, depths: Range, spread: float) -> list[Spot]:
-        """Up to `count` random spots at depths in units."""
+        """Random spots at depths in units of `unit_m`: of `count` draws those that belong to the area."""
         near, far = depths
         drawn = [
             self.placement.random_spot(rng, (near * self.unit_m, far * self.unit_m), spread)
             for _ in range(count)
         ]
-        return [spot for spot in drawn if self.holds(spot)]
+        return [spot for spot in drawn if self.contains(spot)]
 
 
 NO_SWAY_BEYOND = 2.2
-"""Plants farther away than this many units do not sway: too little to see, and they can share their meshes."""
+"""Plants farther away than this many units do not sway: it would hardly be seen, and so they share meshes."""
 
 
 def _pairings(rng: np.random.Generator, kinds: Sequence[T], materials: Sequence[int]) -> list[tuple[T, int]]:
-    """Each kind and each material at least once, in few pairs: things alike in both are one mesh."""
+    """Pairs of a kind and a material, each used at least once; few pairs, so that objects share meshes."""
     count = max(len(kinds), len(materials)) + 2
     order = rng.permutation(count)
     return [(kinds[k % len(kinds)], materials[int(order[k]) % len(materials)]) for k in range(count)]
@@ -72,7 +73,7 @@ def trees(
     foliage: Sequence[TextureSampler],
     trunk: TextureSampler = bark,
 ) -> None:
-    """Trees of a few kinds; wood and leaves wear their own stuffs."""
+    """Trees of a few kinds, their wood and leaves in materials of their own."""
     placement, unit_m = area.placement, area.unit_m
     seen_m = 1.6 * depths[0] * unit_m
     wood = [placement.new_material(rng, trunk, unit_m, seen_m) for _ in range(2)]
@@ -98,7 +99,10 @@ def plants(
     sunk: float = 0.02,
     spread: float = 1.2,
 ) -> None:
-    """Swaying plants of a few kinds; `sunk` is how deep they stand, relative to their scale."""
+    """Plants of a few kinds; near ones sway by a share `sway` of their height.
+
+    `sunk` is how deep they stand in the ground, relative to their scale; `spread` is the outermost image column.
+    """
     placement, unit_m = area.placement, area.unit_m
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
     green = [placement.new_material(rng, sampler, middle_m, 1.4 * depths[0] * unit_m) for sampler in foliage]
@@ -119,7 +123,7 @@ def undergrowth(
     foliage: Sequence[TextureSampler],
     scales: Range = (0.12, 0.4),
 ) -> None:
-    """Ferns, broad leaves and bushes; the first six close before the camera, at the image's sides."""
+    """Ferns, broad-leaved plants and bushes, six of them close to the camera."""
     kinds = [sample_undergrowth(rng) for _ in range(7)]
     low, high = scales
     plants(rng, area, "near plant", kinds[:3], 6, (0.5, 0.9), (0.6 * low, 0.6 * high), foliage[:2])
@@ -183,7 +187,7 @@ def boulders(
     scales: Range = (0.04, 0.35),
     sunk: Range = (0.2, 0.6),
 ) -> None:
-    """Stones sunk into the ground, by `sunk` relative to their scale."""
+    """Stones, sunk into the ground by `sunk` relative to their scale."""
     placement, unit_m = area.placement, area.unit_m
     kinds = [replace(Boulder.sample(rng), detail=3) for _ in range(4)]
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m

@@ -1,4 +1,4 @@
-"""What a user may choose of the driving family."""
+"""The settings of the driving family."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class DrivingConfig(FamilyConfig):
     pitch_deg: Range = (-3.0, 5.0)
     """How far the camera looks down."""
     roll_deg: Range = (-2.0, 2.0)
-    """How far the camera leans."""
+    """Roll of the camera."""
     yaw_deg: Range = (-6.0, 6.0)
-    """How far the camera looks aside from the street's direction."""
+    """Yaw of the camera from the street's direction."""
     slow_m: Range = (0.15, 0.5)
     """Metres per frame of a slow drive."""
     fast_m: Range = (0.7, 1.6)
@@ -46,7 +46,7 @@ class DrivingConfig(FamilyConfig):
     bend_deg: Range = (6.0, 32.0)
     """How much a winding street may turn within 50 m."""
     view_m: Range = (100.0, 170.0)
-    """How far the street goes on before the camera."""
+    """Length of the street before the camera."""
     lanes: Count = (1, 2)
     """Lanes in each direction."""
     lane_m: Range = (2.9, 3.6)

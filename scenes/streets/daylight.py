@@ -16,7 +16,7 @@ from scenes.textures.sky import Sky
 
 @dataclass(frozen=True)
 class Daylight:
-    """What lights the street apart from lamps."""
+    """The lighting of a street, apart from lamps."""
 
     suns: tuple[SunLight, ...]
     world: World

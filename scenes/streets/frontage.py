@@ -1,4 +1,4 @@
-"""What lines the street: rows of houses by district, gardens, fences, the skyline behind."""
+"""What lines a street: rows of houses by district, gardens, fences, the skyline behind them."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from scenes.streets.along_course import on_course
 
 @dataclass(frozen=True)
 class District:
-    """What one side of a street is like."""
+    """A kind of street side."""
 
     share: float
-    """How many sides of streets are of this kind, relative to the others."""
+    """How many street sides are of this kind, relative to the others."""
     houses: tuple[str, ...]
     """Kinds of `HouseDesign`; none for open land."""
     setback_m: Range
@@ -44,7 +44,7 @@ class District:
     trees: float
     """How many of the sides have a row of trees on the pavement."""
     boundary: tuple[str, ...] = ()
-    """What may stand between pavement and garden: kinds of `Fence`, or hedge."""
+    """What may stand between pavement and garden: styles of `Fence`, or "hedge"."""
 
 
 DISTRICTS: dict[str, District] = {
@@ -85,7 +85,7 @@ class Side:
     """Whether a parking lane runs along the kerb."""
 
     def turn_deg(self) -> float:
-        """The turn at which a thing's y axis points away from the street."""
+        """Rotation at which a thing's y axis points away from the street, degrees."""
         return 0.0 if self.sign > 0 else 180.0
 
 

@@ -1,4 +1,4 @@
-"""The stereo rig on its drive along the street."""
+"""The stereo rig and how it drives along a street."""
 
 from __future__ import annotations
 
@@ -92,7 +92,10 @@ def sample_drive(rng: np.random.Generator, config: DrivingConfig) -> Drive:
 
 
 def sample_camera(rng: np.random.Generator, config: DrivingConfig, drive: Drive) -> StereoCamera:
-    """A camera on its drive; the baseline is small enough for the road to keep within the disparities allowed."""
+    """Draw the rig's camera, moving along the drive.
+
+    Its baseline is so small that the road keeps within the largest disparity allowed.
+    """
     focal_mm = choose(rng, config.focal_lengths_mm)
     height_m, pitch = uniform(rng, *config.camera_height_m), uniform(rng, *config.pitch_deg)
     roll, yaw = uniform(rng, *config.roll_deg), uniform(rng, *config.yaw_deg)

@@ -1,4 +1,4 @@
-"""What stands and walks on the pavements: lamps, trees, signs, furniture, people."""
+"""Things on the pavements: lamps, trees, signs, furniture, people."""
 
 from __future__ import annotations
 
@@ -38,18 +38,21 @@ _Parts = list[tuple[str, MetricShape, int]]
 _FINE_M = 45.0
 """Trees farther along the street than this have fewer leaves."""
 _LAMPS_LIT = 5
-"""Street lamps that shine: those nearest to the rig; the others' light would hardly be seen."""
+"""How many street lamps give light: those nearest to the rig. The others' light would hardly be seen."""
 
 
 class Pavement:
-    """The free places of one pavement: nothing is put where something stands."""
+    """One pavement and which of its places are taken."""
 
     def __init__(self, side: Side) -> None:
         self.side = side
         self._taken: list[tuple[float, float, float, float]] = []
 
-    def free(self, s_m: float, t_m: float, reach_m: float, travel_m: float = 0.0) -> bool:
-        """Whether a disc is free, and the way it moves to and fro along the street; if so both are taken."""
+    def take(self, s_m: float, t_m: float, reach_m: float, travel_m: float = 0.0) -> bool:
+        """Take a disc of radius `reach_m` at (s, t) if it is free; False if it is not.
+
+        The disc moves by up to `travel_m` along the street either way.
+        """
         for s, t, reach, travel in self._taken:
             apart = max(abs(s - s_m) - travel - travel_m, 0.0)
             if math.hypot(apart, t - t_m) < reach + reach_m:
@@ -97,7 +100,7 @@ def add_lamps(
         s, number = drive.course.start_m + uniform(rng, 2.0, spacing), 0
         while s < drive.course.end_m - 2.0:
             t = pavement.near_kerb(0.5)
-            pavement.free(s, t, 0.4)
+            pavement.take(s, t, 0.4)
             # The arm's x axis points over the street.
             turn = -90.0 if pavement.side.sign > 0 else 90.0
             scene.add(
@@ -157,7 +160,7 @@ def add_trees(
             t = pavement.near_wall(-behind)
             near, far = choose(rng, kinds)
             name, turn = pavement.name(f"tree {row}", number), uniform(rng, 0.0, 360.0)
-            if pavement.free(at, t, 0.7):
+            if pavement.take(at, t, 0.7):
                 parts = far if at > _FINE_M else near
                 scene.add(*on_course(name, parts, drive.course, at, t, turn_deg=turn, z_m=ground_m))
             s += spacing
@@ -214,7 +217,7 @@ def add_furniture(
         for k in range(integer(rng, 3, 8) if piece.row_m else 1):
             at = s + k * piece.row_m
             name = pavement.name(piece.name, number) + (f".{k}" if piece.row_m else "")
-            if pavement.free(at, t, piece.reach_m):
+            if pavement.take(at, t, piece.reach_m):
                 scene.add(*on_course(name, piece.parts, course, at, t, turn_deg=turn, z_m=ground_m))
 
 
@@ -268,7 +271,7 @@ def add_traffic_lights(
             ahead = (pavement.side.sign > 0) == drive.keep_left
             s = crossing + (-2.6 if ahead else 2.6)
             t = pavement.near_kerb(0.45)
-            pavement.free(s, t, 0.3)
+            pavement.take(s, t, 0.3)
             # Its arm is along y: over the street when the light is turned towards its traffic.
             turn = 180.0 if ahead else 0.0
             over = 1.0 if (turn == 0.0) == (pavement.side.sign < 0) else -1.0
@@ -308,7 +311,7 @@ def add_people(
         parts = wardrobe.dressed(rng)
         travel = abs(walk) * (drive.frames + 1) / 2
         inside = course.start_m + 1.0 < s - travel and s + travel < course.end_m - 1.0
-        if not inside or not pavement.free(s, t, 0.35, travel):
+        if not inside or not pavement.take(s, t, 0.35, travel):
             continue
         count = 2 + math.floor(2 * travel / 4.0) if walk else 1
         times = np.linspace(-1.0, float(drive.frames), count).tolist() if walk else [0.0]

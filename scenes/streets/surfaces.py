@@ -1,4 +1,4 @@
-"""The ground: carriageway, paint, kerbs, pavements, gardens, the land beyond."""
+"""The ground of a street: carriageway, markings, kerbs, pavements, gardens, the land beyond."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LAND_M = 900.0
 
 @dataclass(frozen=True)
 class Ground:
-    """What the rest of the scene needs to know of the ground."""
+    """Measures of the ground that other parts of the scene need."""
 
     crossings: tuple[float, ...]
     """s of the middles of the zebra crossings."""
@@ -33,7 +33,7 @@ class Ground:
 def lay_ground(
     rng: np.random.Generator, scene: Assembly, config: DrivingConfig, drive: Drive, sides: tuple[Side, Side]
 ) -> Ground:
-    """Everything underfoot."""
+    """Add all surfaces of the ground."""
     course = drive.course
     left, right = sides
     road = (left.kerb_m, -right.kerb_m, uniform(rng, 0.0, 0.06))

@@ -37,14 +37,14 @@ _CAR_KINDS = ("hatchback", "hatchback", "saloon", "estate", "suv", "suv")
 
 @dataclass(frozen=True)
 class Model:
-    """A make of vehicle: its parts with the materials all of its kind share, its wheels."""
+    """A model of vehicle: its parts, with the materials that all its vehicles share, and its wheels."""
 
     length: float
     half_width: float
     """With the mirrors."""
     parts: tuple[tuple[str, MetricShape, int], ...]
     painted: tuple[tuple[str, MetricShape], ...]
-    """Parts that wear each vehicle's own paint."""
+    """Parts that have each vehicle's own paint."""
     wheel: Wheel
     wheel_material: int
     wheels: tuple[tuple[float, float], ...]
@@ -56,7 +56,7 @@ class Model:
 
 @dataclass
 class Fleet:
-    """The makes of vehicle a scene has; few, so that they share their meshes."""
+    """The models of vehicles in a scene; few, so that vehicles share their meshes."""
 
     cars: list[Model]
     large: list[Model]
@@ -146,7 +146,7 @@ def _livery(rng: np.random.Generator) -> Srgb:
 
 
 def vehicle_of(name: str) -> str:
-    """The vehicle a part's name speaks of: "parked L3 head lamps" is of "parked L3"."""
+    """Name of the vehicle that a part belongs to: "parked L3" for the part "parked L3 head lamps"."""
     return " ".join(name.split()[:2])
 
 
@@ -212,7 +212,7 @@ def _rolling(
 def add_moving(
     rng: np.random.Generator, scene: Assembly, config: DrivingConfig, drive: Drive, fleet: Fleet
 ) -> None:
-    """Vehicles in all lanes, those of a lane at one speed, so that they keep their distances."""
+    """Vehicles in all lanes; those of one lane have one speed, so that they keep their distances."""
     for number, lane in enumerate(drive.lanes):
         own = lane == drive.lane
         speed = (

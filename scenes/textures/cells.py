@@ -1,4 +1,4 @@
-"""Pictures divided into irregular cells: mosaics, cobblestones, cracked mud, scales."""
+"""Cellular patterns: mosaics, cobblestones, cracked mud, scales."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ from scenes.spec import Texture
 def cellular_noise(
     rng: np.random.Generator, x: Field, y: Field, cells: int, jitter: float
 ) -> tuple[NDArray[np.int32], Field, Field]:
-    """Worley's cellular noise on a periodic jittered grid of cells x cells points.
+    """Cellular noise on a periodic jittered grid of cells x cells points (Worley 1996).
 
-    Returns the index of the nearest point, the distance to it and that to the second nearest, in grid
-    steps. Only the 3 x 3 neighbouring grid cells are searched.
+    `x`, `y` (H, W) are places in pictures, of period 1; `jitter` is 0 for a square grid, 1 for a random one.
+    Returns, (H, W) each, the index of the nearest point, the distance to it and that to the second nearest, in
+    grid steps. Only the 3 x 3 neighbouring cells are searched.
     """
     points = 0.5 + jitter * rng.uniform(-0.5, 0.5, (2, cells, cells))
     # Absolute positions with a margin of one cell on every side, so that neighbours need no wrapping.
@@ -51,7 +52,7 @@ def cellular_noise(
 
 @dataclass(frozen=True)
 class VoronoiCells(Texture):
-    """Cells of flat but varied colour between joints: mosaics, terrazzo, giraffes, dry earth."""
+    """Voronoi cells of different colours between joints: mosaics, terrazzo, giraffes, dry earth."""
 
     size: int
     seed: int
@@ -64,7 +65,7 @@ class VoronoiCells(Texture):
     joint_width: float
     """In cells; 0 for none."""
     warp: float
-    """Waviness of the joints in cells."""
+    """Amplitude of the joints' waves, in cells."""
     grain: float
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Pictures with shapes in them: collages, blurred shapes, rows of glyphs, facades."""
+"""Pictures of many shapes: overlapping ones, blurred ones, rows of glyphs, facades."""
 
 from __future__ import annotations
 
@@ -33,10 +33,11 @@ from scenes.spec import Texture
 def overlapping_shapes(
     rng: np.random.Generator, size: int, radii: NDArray[np.float64], corners: int
 ) -> tuple[NDArray[np.int16], Field]:
-    """Discs (corners 0), polygons or mixtures (-1) dropped on a periodic picture one after the other.
+    """Shapes painted over one another on a periodic picture of `size` x `size` pixels.
 
-    `radii` (N,) in pixels. Returns which shape is on top at each pixel, counted from 1 (0: none), and a
-    gradient across each shape, -1..1 in a direction of its own.
+    `radii` (N,) are in pixels; `corners` is 0 for discs, 3 or more for polygons, -1 for a mixture. Returns,
+    (H, W) each, the shape on top at each pixel, counted from 1 (0: none), and a linear ramp across each shape,
+    -1..1 in a random direction.
     """
     top = np.zeros((size, size), np.int16)
     centres = rng.integers(0, size, (len(radii), 2))
@@ -62,7 +63,7 @@ def overlapping_shapes(
 
 
 def _shape_gauge(u: Field, v: Field, corners: int) -> Field:
-    """A shape's gauge: at most 1 inside a disc (corners 0) or a regular polygon of unit radius."""
+    """(H, W) gauge function of a disc (corners 0) or a regular polygon of unit radius: at most 1 inside."""
     if corners == 0:
         return np.hypot(u, v)
     if corners == 4:
@@ -74,16 +75,16 @@ def _shape_gauge(u: Field, v: Field, corners: int) -> Field:
 
 @dataclass(frozen=True)
 class DeadLeaves(Texture):
-    """Figures of all sizes heaped on one another: the occlusions and scale invariance of photographs.
+    """The dead leaves model: shapes of all sizes that occlude one another, scale invariant as photographs are.
 
-    Lee, Mumford, Huang, "Occlusion models for natural images", 2001: radii fall as r^-3.
+    Lee, Mumford, Huang, "Occlusion models for natural images", 2001; the density of radii falls as r^-3.
     """
 
     size: int
     seed: int
     palette: Palette
     corners: int
-    """0 discs, 3.. polygons, -1 a mixture."""
+    """0 for discs, 3 or more for polygons, -1 for a mixture."""
     shapes: int
     smallest: float
     """Radius in pixels."""
@@ -111,14 +112,14 @@ class DeadLeaves(Texture):
         low, high = self.smallest, self.largest * self.size
         share = rng.uniform(0.0, 1.0, self.shapes)
         radii = (low**-2 + share * (high**-2 - low**-2)) ** -0.5
-        # Small shapes on a heap of big ones; a heap the other way round shows only the big ones.
+        # Small shapes lie over big ones; the other way round only the big ones would show.
         big = self.shapes // 6
         radii[:big] = rng.uniform(0.4 * high, high, big)
         top, ramp = overlapping_shapes(rng, self.size, radii, self.corners)
         colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.shapes + 1)]
         colors *= rng.uniform(0.7, 1.25, (self.shapes + 1, 1)).astype(np.float32)
         slopes = rng.normal(0.0, 0.25, self.shapes + 1).astype(np.float32)
-        # Each shape shows its own piece of the noise, as each leaf has its own veins.
+        # Each shape shows its own part of the noise, as each leaf has its own veins.
         noise = spectral_noise(rng, self.size, 0.8, 4).ravel()
         shift = rng.integers(0, self.size**2, self.shapes + 1)[top].ravel()
         detail = noise[(np.arange(self.size**2) + shift) % self.size**2].reshape(top.shape)
@@ -128,7 +129,7 @@ class DeadLeaves(Texture):
 
 @dataclass(frozen=True)
 class BlurredShapes(Texture):
-    """Bright shapes out of focus, over and through each other: bokeh, stained walls, watercolour."""
+    """Blurred overlapping shapes: bokeh, stained walls, watercolour."""
 
     size: int
     seed: int
@@ -167,15 +168,15 @@ class BlurredShapes(Texture):
 
 @dataclass(frozen=True)
 class GlyphRows(Texture):
-    """Lines of words in an alphabet that never was: print, signs, labels."""
+    """Lines of words in an invented alphabet: print, signs, labels."""
 
     size: int
     seed: int
     palette: Palette
-    """Paper first, then inks."""
+    """The paper, then the inks."""
     lines: int
     letters: int
-    """Places for letters in a line."""
+    """Letters and spaces in a line."""
     alphabet: int
     """Number of different letters."""
     grain: float

@@ -1,4 +1,4 @@
-"""Textures of plants, drawn to scale: leaves, lawns, bark."""
+"""Plants at a fixed scale, for streets: leaves, lawns, bark."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from scenes.textures.cells import cellular_noise
 
 @dataclass(frozen=True)
 class Foliage(Texture):
-    """Leaves in all directions, light ones over dark ones."""
+    """A dense cover of light and dark leaves."""
 
     size: int
     seed: int
@@ -64,7 +64,7 @@ class Foliage(Texture):
 
 @dataclass(frozen=True)
 class Grass(Texture):
-    """Mown lawn, meadow or bare earth between."""
+    """Lawn or meadow, with dry patches."""
 
     size: int
     seed: int
@@ -91,7 +91,7 @@ class Grass(Texture):
 
 @dataclass(frozen=True)
 class Bark(Texture):
-    """Ridges along the stem."""
+    """Bark with ridges along the stem."""
 
     size: int
     seed: int

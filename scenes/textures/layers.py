@@ -1,4 +1,4 @@
-"""Pictures made of other pictures."""
+"""Pictures composed of other pictures."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Pictures of streets: asphalt, paving, paint, signs, wheels.
+"""Streets at a fixed scale: asphalt, paving, road markings, signs, wheels.
 
-All are drawn by the driving family alone: each belongs on one kind of surface, at one scale.
+Only the driving family uses them: each belongs on one kind of surface, at one scale.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from scenes.textures.cells import cellular_noise
 
 @dataclass(frozen=True)
 class Asphalt(Texture):
-    """Bitumen with stones in it, darker and lighter patches, cracks, some sealed with tar."""
+    """Bitumen with stones in it, darker and lighter patches, and cracks."""
 
     size: int
     seed: int
@@ -78,7 +78,7 @@ class Asphalt(Texture):
 
 @dataclass(frozen=True)
 class Paving(Texture):
-    """Slabs or blocks with joints, each of its own tone: pavements, driveways, garden walls' coping."""
+    """Slabs or blocks of different shades with joints: pavements, driveways, copings."""
 
     size: int
     seed: int
@@ -130,15 +130,15 @@ class Paving(Texture):
 
 @dataclass(frozen=True)
 class RoadMarkingPaint(Texture):
-    """Road paint that has been driven over."""
+    """The worn paint of road markings."""
 
     size: int
     seed: int
     color: Srgb
     below: Srgb
-    """What shows where it has gone."""
+    """What shows where the paint is gone."""
     worn: float
-    """Share gone, about."""
+    """Share that is gone, about."""
 
     popularity: ClassVar[float] = 0.0
 
@@ -162,9 +162,9 @@ class RoadMarkingPaint(Texture):
 
 @dataclass(frozen=True)
 class RoadSign(Texture):
-    """The face of a sign: a border, a field and a device on it.
+    """The face of a traffic sign: a field with a border and a symbol.
 
-    The picture is the square around the plate, once.
+    The picture is the bounding square of the plate.
     """
 
     size: int

@@ -1,4 +1,4 @@
-"""Pictures that repeat regularly: bricks, checkers, stripes, plaid, dots, weave."""
+"""Regular patterns: bricks, checkers, stripes, plaid, dots, weave."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _wear(rng: np.random.Generator, size: int, strength: float) -> Field:
 
 @dataclass(frozen=True)
 class Bricks(Texture):
-    """Courses of bricks or tiles of varied tone in mortar."""
+    """Courses of bricks or tiles of different shades in mortar."""
 
     size: int
     seed: int
@@ -86,7 +86,7 @@ class Bricks(Texture):
 
 @dataclass(frozen=True)
 class Checkers(Texture):
-    """Squares of two or more colours in turn, worn."""
+    """Squares of two or more colours in turn, a little worn."""
 
     size: int
     seed: int
@@ -165,7 +165,7 @@ class Stripes(Texture):
 
 @dataclass(frozen=True)
 class Plaid(Texture):
-    """Two crossing sets of stripes, woven in twill: tartan, dish cloths."""
+    """Two crossing sets of stripes, woven in twill: tartan, tea towels."""
 
     size: int
     seed: int

@@ -1,4 +1,4 @@
-"""Soft bodies, their fur, and eyes."""
+"""Parts of characters: soft bodies, their fur, eyeballs, staffs."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ class Limb:
 
 @dataclass(frozen=True)
 class SoftBody(PartedShape):
-    """Limbs melted into one smooth body, as plump or as furry as asked for: creatures, robes, statues."""
+    """Limbs blended into one smooth body, with folds or fur if asked for: creatures, robes, statues."""
 
     limbs: tuple[Limb, ...]
     blend: float
-    """Distance over which limbs melt into each other."""
+    """Distance over which limbs blend into each other."""
     folds: float
     """Height of lengthwise creases, as in cloth; 0 for none."""
     tufts: int
     """Locks of fur on the skin; 0 for bare skin."""
     tuft_length: float
     comb: Vector
-    """Direction the fur is combed in, of length 0 (it stands on end) to about 1."""
+    """Direction in which the fur is combed; its length runs from 0 (fur stands on end) to about 1."""
     cells: int
     """Grid cells along the longest side: how finely the skin is meshed."""
     seed: int
@@ -52,7 +52,7 @@ class SoftBody(PartedShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        """A heap of limbs, each growing out of another: coral, cactus, clay figures."""
+        """Random limbs, each growing out of another: coral, cactus, clay sculptures."""
         limbs: list[Limb] = []
         for _ in range(integer(rng, 3, 8)):
             start = limbs[int(rng.integers(len(limbs)))].end if limbs else (0.0, 0.0, 0.0)
@@ -144,7 +144,7 @@ def _locks(
 
 @dataclass(frozen=True)
 class Eyeballs(PartedShape):
-    """Balls that look along a direction, the iris mapped about it; texture coordinates centre on the iris."""
+    """Eyeballs that look along a direction; texture coordinates are 0 in the middle of the iris."""
 
     centres: tuple[Vector, ...]
     gaze: Vector

@@ -1,4 +1,4 @@
-"""The lie of the land: eroded terrain, caves, boulders, dripstone."""
+"""Landforms: eroded terrain, caves, boulders, dripstone."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ def eroded_relief(
 
 @dataclass(frozen=True)
 class Landscape(Shape):
-    """A block of land: a gentle clearing in the middle, eroded hills or mountains about it.
+    """A block of land: a level clearing in the middle, eroded hills or mountains about it.
 
-    The cells are smaller towards the middle, where a camera stands; the middle itself is at height 0.
+    The cells are smaller towards the middle, where a camera stands; the land has height 0 there.
     """
 
     relief: float
@@ -122,7 +122,7 @@ class Landscape(Shape):
 
 @dataclass(frozen=True)
 class Cavern(PartedShape):
-    """A winding tunnel through rock, open at both ends: its wall is solid, a traveller inside is not.
+    """A winding tunnel through rock, open at both ends. Its wall is the solid; a camera inside is outside of it.
 
     It runs along +y from y = 0; the axis is at the origin there. Its radius is about 1.
     """

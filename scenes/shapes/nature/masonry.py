@@ -1,4 +1,4 @@
-"""Buildings and what is left of them: columns, arches, block walls and towers, steps, houses, roofs."""
+"""Buildings and ruins: columns, arches, walls and towers of blocks, steps, houses."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _BOX_FACES = np.array(
 )
 
 
-def boxes(
+def oriented_boxes(
     centre: NDArray[np.float64], half: NDArray[np.float64], turn: NDArray[np.float64] | None = None
 ) -> Part:
     """Boxes about (N, 3) centres with (N, 3) half sides, each turned by a (N, 3, 3) rotation."""
@@ -97,7 +97,7 @@ class Column(PartedShape):
     @staticmethod
     def _slab(half: float, low: float, high: float) -> Part:
         middle, size = np.array([[0.0, 0.0, (low + high) / 2]]), np.array([[half, half, (high - low) / 2]])
-        return boxes(middle, size)
+        return oriented_boxes(middle, size)
 
     @staticmethod
     def _drum(radius: NDArray[np.float64], height: NDArray[np.float64]) -> Part:
@@ -198,7 +198,7 @@ class Archway(PartedShape):
 
 @dataclass(frozen=True)
 class BlockWall(PartedShape):
-    """Courses of single stones, along a line or an arc, the top courses partly fallen: walls, towers."""
+    """Courses of single stones along a line or an arc, the top courses partly fallen: walls, towers."""
 
     courses: int
     stones: int
@@ -266,7 +266,7 @@ class BlockWall(PartedShape):
         turn[:, 0, 0] = turn[:, 1, 1] = np.cos(heading)
         turn[:, 0, 1], turn[:, 1, 0] = -np.sin(heading), np.sin(heading)
         turn[:, 2, 2] = 1.0
-        return {"stone": boxes(centre, half, turn)}
+        return {"stone": oriented_boxes(centre, half, turn)}
 
 
 @dataclass(frozen=True)
@@ -311,7 +311,7 @@ class Steps(PartedShape):
         centre = np.stack(
             [np.zeros(self.steps), (start + end) / 2 - end / 2, (np.arange(self.steps) + 0.5) * self.rise], -1
         )
-        return {"stone": boxes(centre, half)}
+        return {"stone": oriented_boxes(centre, half)}
 
 
 @dataclass(frozen=True)
@@ -361,7 +361,7 @@ class House(PartedShape):
         if self.chimney:
             top = self.height + self.pitch / 2
             middle = np.array([[0.22, 0.25 * self.length, (self.height + top + 0.15) / 2]])
-            stack = boxes(middle, np.array([[0.07, 0.07, (top + 0.15 - self.height) / 2]]))
+            stack = oriented_boxes(middle, np.array([[0.07, 0.07, (top + 0.15 - self.height) / 2]]))
             parts["walls"] = joined(parts["walls"], stack)
         return parts
 

@@ -68,11 +68,11 @@ class GrassTuft(PartedShape):
 
 @dataclass(frozen=True)
 class Fern(PartedShape):
-    """Arching fronds with a row of leaflets on either side."""
+    """Arching fronds, each with two rows of leaflets."""
 
     fronds: int
     leaflets: int
-    """On each side of a frond."""
+    """In each row of a frond."""
     elevation_deg: float
     """How steeply the fronds rise at their base."""
     droop: float
@@ -323,7 +323,7 @@ class Mushroom(PartedShape):
 
 
 UNDERGROWTH: tuple[type[Shape], ...] = (Fern, BroadLeaves, Bush)
-"""Undergrowth that any green place may have."""
+"""Kinds of undergrowth."""
 
 
 def sample_undergrowth(rng: np.random.Generator) -> Shape:

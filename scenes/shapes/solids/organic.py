@@ -20,7 +20,7 @@ from scenes.spec import Shape, Vector
 def wave_noise(
     rng: np.random.Generator, points: NDArray[np.float64], frequency: float, slope: float, waves: int = 24
 ) -> NDArray[np.float64]:
-    """Smooth noise of unit variance at points (N, D): plane waves of random direction, length and phase.
+    """(N,) smooth noise of unit variance at points (N, D): a sum of plane waves of random direction and phase.
 
     Wave numbers run log-uniformly from `frequency` to 4 * `frequency` (radians per unit), amplitudes fall
     as number^-slope.
@@ -196,8 +196,8 @@ def _leaves(
 class Terrain(Shape):
     """A block with a hilly top: the ground of a scene, or a piece of landscape.
 
-    The cells are smaller towards the middle, where a camera stands. The middle itself is at height 0 of the
-    hills, so that an observer's height over the ground is known.
+    The cells are smaller towards the middle, where a camera stands. The hills have height 0 in the middle, so
+    that a camera's height over the ground is known.
     """
 
     relief: float

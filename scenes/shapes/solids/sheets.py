@@ -18,9 +18,9 @@ from scenes.spec import Shape
 def thickened(
     points: NDArray[np.float64], plan: NDArray[np.float64], thickness: float, *, smooth: bool
 ) -> Mesh:
-    """A sheet of points (R, C, 3) given a thickness along its normals; `plan` (R, C, 2) is its texture.
+    """A closed slab: a sheet of points (R, C, 3) with a thickness along its normals.
 
-    Closed: the two faces share a rim of quadrilaterals.
+    `plan` (R, C, 2) are the texture coordinates of the points.
     """
     rows, columns = points.shape[:2]
     along_rows, along_columns = np.gradient(points, axis=0), np.gradient(points, axis=1)

@@ -1,4 +1,4 @@
-"""What divides gardens from pavements: fences, walls and hedges that follow a street's course."""
+"""Boundaries of gardens: fences, walls and hedges that follow a street's course."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Houses, part by part: walls with window openings, what stands in the openings, trim, roof.
+"""Houses, part by part: walls with window openings, the windows in them, trim, roof.
 
 A building's parts share one design and one origin: the left end of its front at the ground, seen from the
 street. x runs along the front, y into the building, z up, metres.
@@ -22,7 +22,7 @@ _Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 WALL_M = 0.36
 """Thickness of the walls."""
 NOMINAL_BAY_M = 3.0
-"""One bay or floor of a wall in the texture coordinates of what stands in its openings."""
+"""Length of one bay or floor of a wall in the texture coordinates of its windows."""
 
 
 @dataclass(frozen=True)
@@ -236,7 +236,7 @@ class HouseWalls(MetricShape):
 
 @dataclass(frozen=True)
 class HouseWindows(MetricShape):
-    """The body behind the openings of the ground floor or of all others.
+    """The windows of the ground floor or of all others: one body behind the openings of the walls.
 
     Texture coordinates count bays and floors, each as `NOMINAL_BAY_M`, so that a picture of windows meets the
     openings.

@@ -1,6 +1,6 @@
-"""What stands along a street: lamp posts, signs, traffic lights, fences, bollards, bins, benches, shelters.
+"""Street furniture: lamp posts, signs, traffic lights, bollards, bins, benches, cabinets, shelters.
 
-Each stands on its origin; x is along the street or away from the post, z up, metres.
+The anchor is on the ground; x is along the street or away from the post, z up, metres.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Streets: surfaces swept along a winding course, and the paint on them."""
+"""Roads: surfaces swept along a winding course, and the markings on them."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _STEP_M = 0.5
 class Course:
     """A street's centre line: headings at equal steps, smooth between, never turning back on itself.
 
-    Coordinates along it are (s, t): metres along the line, metres to its left. s = 0 is the world's origin,
-    where the heading is that of the x axis.
+    Street coordinates are (s, t), as in OpenDRIVE: metres along the line, metres to its left. s = 0 is the
+    world's origin, where the heading is that of the x axis.
     """
 
     start_m: float
@@ -101,7 +101,7 @@ class Course:
 
 
 def sample_course(rng: np.random.Generator) -> Course:
-    """Any course, for shapes that are drawn on their own."""
+    """A random course, for shapes that are sampled on their own."""
     return Course.sample(rng, -20.0, uniform(rng, 60.0, 180.0), 25.0)
 
 
@@ -163,7 +163,7 @@ class Stripe:
 
 @dataclass(frozen=True)
 class RoadMarkings(MetricShape):
-    """Lane lines, zebra bars, arrows, patches of tar: bars a few millimetres thick that follow a course."""
+    """Lane lines, zebra bars, patches of tar: bars a few millimetres thick that follow a course."""
 
     course: Course
     stripes: tuple[Stripe, ...]

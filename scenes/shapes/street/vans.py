@@ -104,8 +104,8 @@ def sample_van_design(rng: np.random.Generator) -> VanDesign:
     return VanDesign.sample(rng, choose(rng, ["van", "lorry", "bus"]))
 
 
-def _pulled(profile: NDArray[np.float64], half_width: float, bevel: float) -> Part:
-    """A side view pulled across the vehicle's width, its edges bevelled."""
+def _extruded(profile: NDArray[np.float64], half_width: float, bevel: float) -> Part:
+    """A side view extruded across the vehicle's width, its edges bevelled."""
     middle = profile.mean(axis=0)
     size = np.ptp(profile, axis=0)
     inset = middle + (profile - middle) * (1 - 2 * bevel / size)
@@ -133,7 +133,7 @@ class VanBody(MetricShape):
 
     def surface(self) -> Surface:
         design = self.design
-        body = _pulled(design.profile(), design.width / 2, 0.07)
+        body = _extruded(design.profile(), design.width / 2, 0.07)
         body = without_arches(body, design.axles, design.wheel_radius, design.width)
         x, half, z = design.screen_foot[0] - 0.1, design.width / 2, design.screen_foot[1] + 0.25
         low = np.array([(x - 0.05, half - 0.13, z), (x - 0.05, -half - MIRROR_M, z)])

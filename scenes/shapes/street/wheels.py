@@ -73,7 +73,7 @@ class Wheel(MetricShape):
 
 @dataclass(frozen=True)
 class WheelSet(MetricShape):
-    """All wheels of a vehicle that stands still, in its own frame."""
+    """All wheels of a vehicle that stands still, in the coordinates of the vehicle."""
 
     wheel: Wheel
     places: tuple[tuple[float, float], ...]

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from scenes.appearance.painting import finish, mix, smooth_step, to_bytes, unit_grid
 from scenes.textures.cells import cellular_noise
-from scenes.textures.collages import heap_of_figures
+from scenes.textures.collages import overlapping_shapes
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def test_nearest_seeds_are_the_nearest_of_the_periodic_points() -> None:
 
 def test_overlapping_shapes_wrap_around_and_the_last_is_on_top() -> None:
     size, radii = 32, np.array([6.0, 5.0, 4.0])
-    top, _ = heap_of_figures(np.random.default_rng(4), size, radii, 0)
+    top, _ = overlapping_shapes(np.random.default_rng(4), size, radii, 0)
     rng = np.random.default_rng(4)
     centres = rng.integers(0, size, (3, 2))
     rng.uniform(0, 2 * np.pi, 3)
