@@ -49,7 +49,10 @@ _REACH = 1.35
 
 @dataclass(frozen=True)
 class FlyingThingsConfig(FamilyConfig):
-    """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+    """Values are drawn uniformly from the ranges, once for each scene or once for each object, as the fields say.
+
+    Raises ValueError for ranges from which no scene can be sampled.
+    """
 
     depths_for_range = True
 

@@ -52,7 +52,10 @@ PLACES = ("jungle", "meadow", "mushrooms", "cave")
 
 @dataclass(frozen=True)
 class MonkaaConfig(LandscapeConfig):
-    """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+    """Values are drawn uniformly from the ranges, once for each scene or once for each object, as the fields say.
+
+    Raises ValueError for ranges from which no scene can be sampled.
+    """
 
     crowd = ("creatures", "fur_locks", "undergrowth", "grass_tufts", "trees", "boulders")
 
@@ -205,13 +208,13 @@ def _creature_materials(
 ) -> dict[str, int]:
     half_m = 0.5 * scale_m
     gloss = 0.0 if coat is fur or chance(rng, 0.5) else 0.4
-    worn = {
+    materials = {
         "fur": placement.new_material(rng, coat, half_m, depth_m, gloss=gloss),
         "eye": placement.new_material(rng, eye, half_m, depth_m, size=128, gloss=0.5),
     }
     if any(part.material == "horn" for part in character.parts):
-        worn["horn"] = placement.new_material(rng, horn, 0.2 * half_m, depth_m, size=128)
-    return worn
+        materials["horn"] = placement.new_material(rng, horn, 0.2 * half_m, depth_m, size=128)
+    return materials
 
 
 def _jungle(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:

@@ -60,7 +60,10 @@ PERSON_M = 1.75
 
 @dataclass(frozen=True)
 class SintelConfig(LandscapeConfig):
-    """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+    """Values are drawn uniformly from the ranges, once for each scene or once for each object, as the fields say.
+
+    Raises ValueError for ranges from which no scene can be sampled.
+    """
 
     crowd = ("people", "trees", "structures", "boulders", "plants")
 
@@ -216,7 +219,7 @@ def _dressed(
 ) -> bool:
     """Put a character on the ground in materials of its own."""
     names = {part.material for part in character.parts}
-    worn = {
+    materials = {
         material: placement.new_material(
             rng,
             CHARACTER_TEXTURES[material],
@@ -227,7 +230,7 @@ def _dressed(
         )
         for material in sorted(names)
     }
-    return place_character(placement, name, character, worn, spot, scale_m, checked=checked)
+    return place_character(placement, name, character, materials, spot, scale_m, checked=checked)
 
 
 def _mountain(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
@@ -316,8 +319,8 @@ def _town(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
                 (side * (half_street_m + across / 2 + uniform(rng, 0.0, 1.0)), along_m + extent / 2)
             )
             spot = placement.spot_at(centre, facing + float(rng.normal(0.0, 0.06)))
-            worn = {"walls": choose(rng, walls), "roof": choose(rng, roofs)}
-            placement.stand_in_parts(f"house {side} {index}", shape, worn, spot, width_m, on_lowest=True)
+            materials = {"walls": choose(rng, walls), "roof": choose(rng, roofs)}
+            placement.stand_in_parts(f"house {side} {index}", shape, materials, spot, width_m, on_lowest=True)
             along_m += extent * uniform(rng, 1.05, 1.5)
     _ruined(rng, plan, integer(rng, 1, 4), masonry(choose(rng, (ROCK, SAND))), ruin=0.1)
     if chance(rng, 0.6):
@@ -348,12 +351,12 @@ def _ruined(
 ) -> None:
     """Walls, towers, arches, steps, columns and a statue, here and there; `ruin` scales their decay."""
     placement, d = plan.placement, plan.depth_m
-    worn = [placement.new_material(rng, stone, 2.0, 1.8 * d, size=512) for _ in range(2)]
+    masonry_materials = [placement.new_material(rng, stone, 2.0, 1.8 * d, size=512) for _ in range(2)]
     hewn = placement.new_material(rng, plan.place.stones, 2.0, 1.3 * d, size=512)
     for index in range(count):
         kind = choose(rng, (BlockWall, Archway, Steps, Column, "statue"), (0.3, 0.25, 0.12, 0.2, 0.13))
         spot = placement.random_spot(rng, (1.1 * d, 7.0 * d), 1.1)
-        material = choose(rng, worn)
+        material = choose(rng, masonry_materials)
         name = f"ruin {index}"
         if kind is Archway:
             shape = replace(Archway.sample(rng), seed=new_seed(rng))

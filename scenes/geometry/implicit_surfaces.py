@@ -42,10 +42,9 @@ def blended_capsules(
     end_radius: NDArray[np.float64],
     blend: float,
 ) -> NDArray[np.float64]:
-    """(N,) smooth minimum of the distances of points (N, 3) to capsules closer than about `blend` to one another.
+    """(N,) smooth minimum of the distances of points (N, 3) to capsules: they blend where closer than about `blend`.
 
-    The smooth minimum is -blend * log(sum(exp(-distance / blend))). The other arguments are those of
-    `capsule_distances`.
+    It is -blend * log(sum(exp(-distance / blend))). The other arguments are those of `capsule_distances`.
     """
     field = np.empty(len(points))
     for first in range(0, len(points), _CHUNK):

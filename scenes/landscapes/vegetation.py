@@ -78,11 +78,11 @@ def trees(
     seen_m = 1.6 * depths[0] * unit_m
     wood = [placement.new_material(rng, trunk, unit_m, seen_m) for _ in range(2)]
     green = [placement.new_material(rng, sampler, unit_m, seen_m) for sampler in foliage]
-    outfits = [(kind, leaf, choose(rng, wood)) for kind, leaf in _pairings(rng, kinds, green)]
+    pairs = [(kind, leaf, choose(rng, wood)) for kind, leaf in _pairings(rng, kinds, green)]
     for index, spot in enumerate(area.spots(rng, count, depths, 1.2)):
-        kind, leaf, stem = choose(rng, outfits)
-        worn = {"wood": stem, "leaves": leaf}
-        placement.stand_in_parts(f"tree {index}", kind, worn, spot, log_uniform(rng, *scales) * unit_m)
+        kind, leaf, stem = choose(rng, pairs)
+        materials = {"wood": stem, "leaves": leaf}
+        placement.stand_in_parts(f"tree {index}", kind, materials, spot, log_uniform(rng, *scales) * unit_m)
 
 
 def plants(
@@ -106,9 +106,9 @@ def plants(
     placement, unit_m = area.placement, area.unit_m
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
     green = [placement.new_material(rng, sampler, middle_m, 1.4 * depths[0] * unit_m) for sampler in foliage]
-    outfits = _pairings(rng, kinds, green)
+    pairs = _pairings(rng, kinds, green)
     for index, spot in enumerate(area.spots(rng, count, depths, spread)):
-        (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
+        (shape, material), scale_m = choose(rng, pairs), log_uniform(rng, *scales) * unit_m
         moves = spot.depth_m < NO_SWAY_BEYOND * unit_m
         motion = sway_of(rng, shape, uniform(rng, *sway)) if moves else None
         placement.stand(
@@ -170,11 +170,11 @@ def mushrooms(
     middle_m, seen_m = math.sqrt(scales[0] * scales[1]) * unit_m, 1.5 * depths[0] * unit_m
     pale = placement.new_material(rng, horn, middle_m, seen_m)
     caps = [placement.new_material(rng, cap, middle_m, seen_m, emission=glow) for _ in range(3)]
-    outfits = _pairings(rng, kinds, caps)
+    pairs = _pairings(rng, kinds, caps)
     for index, spot in enumerate(area.spots(rng, count, depths, 1.1)):
-        kind, top = choose(rng, outfits)
-        worn = {"stem": pale, "cap": top}
-        placement.stand_in_parts(f"{name} {index}", kind, worn, spot, log_uniform(rng, *scales) * unit_m)
+        kind, top = choose(rng, pairs)
+        materials = {"stem": pale, "cap": top}
+        placement.stand_in_parts(f"{name} {index}", kind, materials, spot, log_uniform(rng, *scales) * unit_m)
 
 
 def boulders(
@@ -191,9 +191,9 @@ def boulders(
     placement, unit_m = area.placement, area.unit_m
     kinds = [replace(Boulder.sample(rng), detail=3) for _ in range(4)]
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
-    worn = [placement.new_material(rng, sampler, middle_m, 1.8 * depths[0] * unit_m) for sampler in stones]
-    outfits = _pairings(rng, kinds, worn)
+    rocks = [placement.new_material(rng, sampler, middle_m, 1.8 * depths[0] * unit_m) for sampler in stones]
+    pairs = _pairings(rng, kinds, rocks)
     for index, spot in enumerate(area.spots(rng, count, depths, 1.15)):
-        (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
+        (shape, material), scale_m = choose(rng, pairs), log_uniform(rng, *scales) * unit_m
         sunk_m = scale_m * uniform(rng, *sunk)
         placement.stand(f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk_m)

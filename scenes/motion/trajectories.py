@@ -76,8 +76,8 @@ def shifted(trajectory: Trajectory, offset_m: NDArray[np.float64]) -> Trajectory
 
 
 def exposure_times(frames: int) -> NDArray[np.float64]:
-    """(N,) instants at which motions are checked: each frame and half a frame about it, at most 60 in all.
+    """(N,) instants at which motions are checked, from half a frame before the first frame to half after the last.
 
-    No shutter is open for longer than a frame, so these cover all exposures.
+    They are half a frame apart, or farther in scenes for which that would take more than 60.
     """
     return np.linspace(-0.5, frames - 0.5, min(2 * frames + 1, 60))

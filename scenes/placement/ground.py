@@ -212,8 +212,8 @@ class GroundPlacement(Assembly):
         if not self.allows(self.box_of(shape, spot, unit_m, sunk_m)):
             return False
         for part in (replace(shape, only=part_name) for part_name in shape.part_names()):
-            worn = materials[part.only]
-            self.stand(f"{name} {part.only}", part, worn, spot, unit_m, sunk_m=sunk_m, checked=False)
+            material = materials[part.only]
+            self.stand(f"{name} {part.only}", part, material, spot, unit_m, sunk_m=sunk_m, checked=False)
         return True
 
     def hang(

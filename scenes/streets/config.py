@@ -10,7 +10,10 @@ from scenes.random_draws import Count, Range
 
 @dataclass(frozen=True)
 class DrivingConfig(FamilyConfig):
-    """Ranges are drawn from uniformly, once a scene or once a thing as the words say."""
+    """Values are drawn uniformly from the ranges, once for each scene or once for each thing, as the fields say.
+
+    Raises ValueError for ranges from which no street can be sampled.
+    """
 
     crowd = ("parked_share", "pedestrians_per_100m", "furniture_per_100m")
     sparsity = ("headway_m", "tree_spacing_m", "lamp_spacing_m")

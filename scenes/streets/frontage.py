@@ -197,8 +197,8 @@ def add_boundary(
         t = side.sign * (side.edge_m + 0.2)
         shape = replace(Fence.sample(rng, kind, course), from_m=start_m, to_m=end_m, t_m=t)
         material = street_materials.fence(rng, kind)
-    name, worn = "fence " + "LR"[side.sign < 0], scene.material(material)
-    scene.add(anchored_object(name, shape, worn, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
+    name, index = "fence " + "LR"[side.sign < 0], scene.material(material)
+    scene.add(anchored_object(name, shape, index, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
 
 
 def add_garden(
@@ -227,6 +227,6 @@ def add_skyline(rng: np.random.Generator, scene: Assembly, course: Course, sides
         side = choose(rng, sides)
         aside = uniform(rng, 0.0, 60.0) if ahead else side.front_m + uniform(rng, 45.0, 140.0)
         block = CityBlock.sample(rng)
-        turn, worn = uniform(rng, -30.0, 30.0), choose(rng, materials)
-        parts = [("", block, worn)]
+        turn, material = uniform(rng, -30.0, 30.0), choose(rng, materials)
+        parts = [("", block, material)]
         scene.add(*on_course(f"block {number}", parts, course, s, side.sign * aside, turn_deg=turn))

@@ -322,8 +322,8 @@ def add_people(
         name = pavement.name("person", number)
         scene.add(
             *(
-                anchored_object(f"{name} {part}", shape, worn, places, turns, times)
-                for part, shape, worn in parts
+                anchored_object(f"{name} {part}", shape, material, places, turns, times)
+                for part, shape, material in parts
             )
         )
 
