@@ -1,4 +1,4 @@
-"""Scenes and configs to plain JSON-able data and back.
+"""Scenes and configs as plain data that JSON and YAML can hold, and back.
 
 Shapes, textures and lights are written with their class name under "kind"; reading accepts only names that
 are registered subclasses, so a scene file can build data but never run code.
@@ -28,7 +28,7 @@ from scenes.user_assets.pool import USER_SHAPES, USER_TEXTURES
 T = TypeVar("T")
 
 OMIT_DEFAULT = {"omit_default": True}
-"""Metadata of a field that is written only where it is not its default, so that records without it read as ever."""
+"""Metadata of a field that is written only where it differs from its default."""
 
 
 def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str = "kind") -> None:
@@ -82,13 +82,17 @@ _converter = _make_converter()
 def to_plain(record: Any, kind: Any = None) -> Any:
     """A record as dicts, lists, strings and numbers, ready for JSON or YAML.
 
-    Give `kind` where the reader will ask for a base class, so that the record's own class is written down.
+    Give the base class as `kind` where the reader will ask for it, so that the record's own class is written
+    too.
     """
     return json.loads(json.dumps(_converter.unstructure(record, kind)))
 
 
 def from_plain(data: Any, kind: type[T]) -> T:
-    """The record of type `kind` described by plain data. ValueError says which field is wrong and why."""
+    """The record of type `kind` that plain data describes.
+
+    Raises ValueError, which says which field is wrong and why.
+    """
     try:
         return _converter.structure(data, kind)
     except ClassValidationError as error:
@@ -108,11 +112,12 @@ def _describe(error: BaseException, kind: type | None) -> str:
 
 
 def scene_to_json(scene: Scene) -> str:
+    """The scene as indented JSON text, which `scene_from_json` reads."""
     return json.dumps(_converter.unstructure(scene), indent=1)
 
 
 def scene_from_json(text: str) -> Scene:
-    """Raises ValueError with one sentence for text that is not a scene."""
+    """The scene that `scene_to_json` wrote. Raises ValueError with one sentence for any other text."""
     try:
         data = json.loads(text)
     except json.JSONDecodeError as error:

@@ -31,7 +31,7 @@ class Sensor:
         light = radiance * np.float32(exposure) * vignette(self._final, *radiance.shape[:2])[..., None]
         if eye == "right":
             light = light * np.float32(2.0**self._final.exposure_difference_ev)
-            light = light * np.array(self._final.right_eye_color, np.float32)
+            light = light * np.array(self._final.right_view_color, np.float32)
         if self._final.noise > 0:
             rng = np.random.default_rng((self._seed, frame, EYES.index(eye)))
             # Photons arrive independently: the deviation of their number grows with the root of it.

@@ -1,4 +1,4 @@
-"""Soft bodies as implicit surfaces: blended capsules, meshed by surface nets."""
+"""Implicit surfaces of soft bodies: blended capsules, meshed by surface nets."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def capsule_distances(
 
 
 _CHUNK = 4096
-"""Points whose distances to all capsules fit in a core's cache together, which is three times as fast."""
+"""Points at a time: their distances to all capsules fit into a core's cache, which is three times as fast."""
 
 
 def blended_capsules(
@@ -42,7 +42,10 @@ def blended_capsules(
     end_radius: NDArray[np.float64],
     blend: float,
 ) -> NDArray[np.float64]:
-    """(N,) smooth minimum of the distances: capsules closer than about `blend` melt into one."""
+    """(N,) smooth minimum of the distances of points (N, 3) to capsules: they blend where closer than about `blend`.
+
+    It is -blend * log(sum(exp(-distance / blend))). The other arguments are those of `capsule_distances`.
+    """
     field = np.empty(len(points))
     for first in range(0, len(points), _CHUNK):
         part = slice(first, first + _CHUNK)

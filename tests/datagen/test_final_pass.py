@@ -218,7 +218,7 @@ def test_noise_grows_with_the_root_of_light_and_follows_from_scene_frame_and_eye
 
 
 def test_the_right_eye_s_exposure_and_colour_differ_as_asked() -> None:
-    final = FinalPass(exposure_difference_ev=-0.5, right_eye_color=(1.1, 1.0, 0.8))
+    final = FinalPass(exposure_difference_ev=-0.5, right_view_color=(1.1, 1.0, 0.8))
     assert np.allclose(expose(final), 0.5)
     assert np.allclose(expose(final, "right"), 0.5 * 2**-0.5 * np.array((1.1, 1.0, 0.8)))
 

@@ -1,4 +1,4 @@
-"""Soft bodies, their fur, and eyes."""
+"""Parts of characters: soft bodies, their fur, eyeballs, staffs."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import Triangles, Vertices, icosphere, joined, scaled_normals, solid, tube
+from scenes.geometry.building import Part, Triangles, Vertices, icosphere, joined, scaled_normals, tube
 from scenes.geometry.implicit_surfaces import blended_capsules, surface_net
-from scenes.geometry.mesh import Mesh
 from scenes.random_draws import chance, integer, log_uniform, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import PartedShape, Surface
 from scenes.shapes.solids.organic import wave_noise
 from scenes.spec import Vector
 
@@ -28,19 +27,19 @@ class Limb:
 
 
 @dataclass(frozen=True)
-class SoftBody(Standing):
-    """Limbs melted into one smooth body, as plump or as furry as asked for: creatures, robes, statues."""
+class SoftBody(PartedShape):
+    """Limbs blended into one smooth body, with folds or fur if asked for: creatures, robes, statues."""
 
     limbs: tuple[Limb, ...]
     blend: float
-    """Distance over which limbs melt into each other."""
+    """Distance over which limbs blend into each other."""
     folds: float
     """Height of lengthwise creases, as in cloth; 0 for none."""
     tufts: int
     """Locks of fur on the skin; 0 for bare skin."""
     tuft_length: float
     comb: Vector
-    """Direction the fur is combed in, of length 0 (it stands on end) to about 1."""
+    """Direction in which the fur is combed; its length runs from 0 (fur stands on end) to about 1."""
     cells: int
     """Grid cells along the longest side: how finely the skin is meshed."""
     seed: int
@@ -53,7 +52,7 @@ class SoftBody(Standing):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        """A heap of limbs, each growing out of another: coral, cactus, clay figures."""
+        """Random limbs, each growing out of another: coral, cactus, clay sculptures."""
         limbs: list[Limb] = []
         for _ in range(integer(rng, 3, 8)):
             start = limbs[int(rng.integers(len(limbs)))].end if limbs else (0.0, 0.0, 0.0)
@@ -144,8 +143,8 @@ def _locks(
 
 
 @dataclass(frozen=True)
-class Eyeballs(Standing):
-    """Balls that look along a direction, the iris mapped about it; texture coordinates centre on the iris."""
+class Eyeballs(PartedShape):
+    """Eyeballs that look along a direction; texture coordinates are 0 in the middle of the iris."""
 
     centres: tuple[Vector, ...]
     gaze: Vector
@@ -167,9 +166,9 @@ class Eyeballs(Standing):
         ball, triangles = icosphere(3)
         return {"eyes": joined(*((ball * self.radius + centre, triangles) for centre in self.centres))}
 
-    def mesh(self) -> Mesh:
-        """The picture is laid on from the front, equal in area: its middle is the pupil (Lambert 1772)."""
-        vertices, triangles = self.surface()
+    def surface(self) -> Surface:
+        """The texture is projected from the front by Lambert's equal-area projection (1772), pupil in the middle."""
+        eyes = super().surface()
         ball, _ = icosphere(3)
         gaze = np.array(self.gaze) / np.linalg.norm(self.gaze)
         right = np.cross(gaze, (0.0, 0.0, 1.0))
@@ -177,16 +176,16 @@ class Eyeballs(Standing):
         up = np.cross(right, gaze)
         flat = np.sqrt(2 / np.maximum(1 + ball @ gaze, 0.02))[:, None] * (ball @ np.stack([right, up], -1))
         uv = np.tile(np.clip(flat, -2, 2) * self.radius, (len(self.centres), 1))
-        return solid(vertices, triangles, uv=uv[triangles], smooth=True, crease_deg=None)
+        return Surface(eyes.vertices, eyes.triangles, uv[eyes.triangles])
 
 
 def iris_repeats(eyes: Eyeballs) -> float:
-    """How often a picture must repeat so that it spans the eye from side to side, its corner in the pupil."""
-    return 1.0 / (2 * 2.0 * eyes.radius * eyes.frame().factor)
+    """How often a texture must repeat to span the eyeball once, its corner in the pupil (`Material.repeats`)."""
+    return 1.0 / (2 * 2.0 * eyes.radius * eyes.frame.factor)
 
 
 @dataclass(frozen=True)
-class Staff(Standing):
+class Staff(PartedShape):
     """A crooked stick with a thick end: staffs, spears, clubs."""
 
     foot: Vector

@@ -41,7 +41,7 @@ def _tidy(body: Manifold) -> Manifold:
 
 @dataclass(frozen=True)
 class CarvedSolid(Shape):
-    """A primitive with bites, bores and notches taken out of it by other primitives."""
+    """A primitive from which other primitives have been subtracted."""
 
     base: str
     """cube, cylinder or sphere."""
@@ -71,7 +71,7 @@ class CarvedSolid(Shape):
             offset = rng.normal(size=3)
             offset *= uniform(rng, 0.3, 1.1) / np.linalg.norm(offset)
             left = body - _placed(cutter, Rotation.random(random_state=rng), self.cut_size, offset)
-            # A cut that would leave only crumbs is not made.
+            # A cut that would leave too little is not made.
             if left.volume() > 0.3 * body.volume():
                 body = left
         vertices, triangles = manifold_arrays(_tidy(body))

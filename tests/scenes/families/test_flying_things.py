@@ -40,7 +40,7 @@ def winding_number(corners: NDArray[np.float64], point: NDArray[np.float64]) -> 
 
 
 @dataclass(frozen=True)
-class Seen:
+class FirstHits:
     """First hits of the rays through the pixels' centres."""
 
     share: NDArray[np.float64]
@@ -49,8 +49,8 @@ class Seen:
     """(H, W) object index, -1 for the sky."""
 
 
-def look(scene: Scene, time_frames: float) -> Seen:
-    """What the left eye sees, by trimesh's ray caster."""
+def first_hits(scene: Scene, time_frames: float) -> FirstHits:
+    """What the left view shows, by trimesh's ray caster."""
     camera = scene.camera
     corners = [world_corners(scene, k, time_frames) for k in range(len(scene.objects))]
     to_eye = np.linalg.inv(camera.pose("left", time_frames))
@@ -68,25 +68,25 @@ def look(scene: Scene, time_frames: float) -> Seen:
     share[hit] = camera.disparity_metres / depth / camera.width
     index[hit] = np.repeat(np.arange(len(corners)), [len(part) for part in corners])[triangle[hit]]
     shape = (camera.height, camera.width)
-    return Seen(share.reshape(shape), index.reshape(shape))
+    return FirstHits(share.reshape(shape), index.reshape(shape))
 
 
 @settings(max_examples=4, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 40))
-def test_neither_eye_is_ever_inside_or_near_anything(seed: int, frames: int) -> None:
+def test_neither_camera_is_ever_inside_or_near_anything(seed: int, frames: int) -> None:
     config = dataclasses.replace(SMALL, frames=frames, background_objects=(10, 15))
     scene = sampled(seed, config)
     nearest_m = scene.camera.disparity_metres / (config.disparity_share[1] * config.width)
     for time in np.linspace(-0.5, frames - 0.5, 3):
-        for eye in ("left", "right"):
-            position = scene.camera.pose(eye, time)[:3, 3]
+        for view in ("left", "right"):
+            position = scene.camera.pose(view, time)[:3, 3]
             for index in range(len(scene.objects)):
                 corners = world_corners(scene, index, time)
                 assert abs(winding_number(corners, position)) < 0.01
                 assert np.linalg.norm(corners - position, axis=2).min() > 0.25 * nearest_m
 
 
-def test_the_winding_number_sees_an_eye_inside() -> None:
+def test_the_winding_number_sees_a_camera_inside() -> None:
     box = np.array(trimesh.creation.box().triangles)
     assert winding_number(box, np.array([0.1, 0.2, -0.3])) == pytest.approx(1.0)
     assert winding_number(box, np.array([0.1, 0.2, -0.6])) == pytest.approx(0.0, abs=1e-9)
@@ -104,9 +104,9 @@ def test_no_flyer_is_nearer_than_allowed_at_any_time(seed: int, frames: int, siz
     nearest_m = scene.camera.disparity_metres / (config.disparity_share[1] * config.width)
     flyers = [k for k, thing in enumerate(scene.objects) if thing.name.startswith("flying")]
     for time in np.linspace(0, frames - 1, min(frames, 5)):
-        eye = scene.camera.pose("left", time)
+        camera = scene.camera.pose("left", time)
         for index in flyers:
-            depth = (world_corners(scene, index, time) - eye[:3, 3]) @ -eye[:3, 2]
+            depth = (world_corners(scene, index, time) - camera[:3, 3]) @ -camera[:3, 2]
             assert depth.min() > 0.999 * nearest_m
 
 
@@ -134,7 +134,7 @@ def test_counts_focal_length_and_baseline_are_in_the_ranges_asked_for() -> None:
 
 def test_everything_scales_with_the_baseline() -> None:
     wide, narrow = (
-        look(sampled(3, dataclasses.replace(SMALL, baseline_m=(b, b))), 0.0).share for b in (1.0, 0.01)
+        first_hits(sampled(3, dataclasses.replace(SMALL, baseline_m=(b, b))), 0.0).share for b in (1.0, 0.01)
     )
     assert np.mean(np.abs(wide - narrow) > 1e-4) < 0.01
 
@@ -182,7 +182,7 @@ def test_what_the_camera_sees_over_many_scenes() -> None:
     flying, largest, medians, everything, above = [], [], [], [], []
     for seed in range(10):
         scene = sampled(seed)
-        seen = look(scene, 0.0)
+        seen = first_hits(scene, 0.0)
         first = next(k for k, thing in enumerate(scene.objects) if thing.name.startswith("flying"))
         flying.append(np.mean(seen.index >= first))
         largest.append(max(np.mean(seen.index == k) for k in range(first, len(scene.objects))))

@@ -1,4 +1,4 @@
-"""Pictures with figures in them: collages, blurred shapes, rows of glyphs, facades."""
+"""Pictures of many shapes: overlapping ones, blurred ones, rows of glyphs, facades."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from scenes.appearance.kernels import put_on_top
+from scenes.appearance.kernels import stamp
 from scenes.appearance.painting import (
     Field,
     Palette,
@@ -30,13 +30,14 @@ from scenes.random_draws import chance, choose, integer, log_uniform, new_seed, 
 from scenes.spec import Texture
 
 
-def heap_of_figures(
+def overlapping_shapes(
     rng: np.random.Generator, size: int, radii: NDArray[np.float64], corners: int
 ) -> tuple[NDArray[np.int16], Field]:
-    """Discs (corners 0), polygons or mixtures (-1) dropped on a periodic picture one after the other.
+    """Shapes painted over one another on a periodic picture of `size` x `size` pixels.
 
-    `radii` (N,) in pixels. Returns which figure is on top at each pixel, counted from 1 (0: none), and a
-    gradient across each figure, -1..1 in a direction of its own.
+    `radii` (N,) are in pixels; `corners` is 0 for discs, 3 or more for polygons, -1 for a mixture. Returns,
+    (H, W) each, the shape on top at each pixel, counted from 1 (0: none), and a linear ramp across each shape,
+    -1..1 in a random direction.
     """
     top = np.zeros((size, size), np.int16)
     centres = rng.integers(0, size, (len(radii), 2))
@@ -51,8 +52,8 @@ def heap_of_figures(
         u = cosines[i].astype(np.float32) * across + sines[i].astype(np.float32) * down
         v = cosines[i].astype(np.float32) * down - sines[i].astype(np.float32) * across
         v /= np.float32(squeezes[i])
-        inside = _figure(u, v, int(kinds[i])) <= 1
-        put_on_top(top, inside, centres[i, 0], centres[i, 1], np.int16(i + 1))
+        inside = _shape_gauge(u, v, int(kinds[i])) <= 1
+        stamp(top, inside, centres[i, 0], centres[i, 1], np.int16(i + 1))
     owner = np.maximum(top - 1, 0)
     x, y = np.meshgrid(np.arange(size), np.arange(size))
     dx = (x - centres[owner, 1] + size // 2) % size - size // 2
@@ -61,8 +62,8 @@ def heap_of_figures(
     return top, (ramp * (top > 0)).astype(np.float32)
 
 
-def _figure(u: Field, v: Field, corners: int) -> Field:
-    """A figure's gauge: at most 1 inside a disc (corners 0) or a regular polygon of unit radius."""
+def _shape_gauge(u: Field, v: Field, corners: int) -> Field:
+    """(H, W) gauge function of a disc (corners 0) or a regular polygon of unit radius: at most 1 inside."""
     if corners == 0:
         return np.hypot(u, v)
     if corners == 4:
@@ -74,17 +75,17 @@ def _figure(u: Field, v: Field, corners: int) -> Field:
 
 @dataclass(frozen=True)
 class DeadLeaves(Texture):
-    """Figures of all sizes heaped on one another: the occlusions and scale invariance of photographs.
+    """The dead leaves model: shapes of all sizes that occlude one another, scale invariant as photographs are.
 
-    Lee, Mumford, Huang, "Occlusion models for natural images", 2001: radii fall as r^-3.
+    Lee, Mumford, Huang, "Occlusion models for natural images", 2001; the density of radii falls as r^-3.
     """
 
     size: int
     seed: int
     palette: Palette
     corners: int
-    """0 discs, 3.. polygons, -1 a mixture."""
-    figures: int
+    """0 for discs, 3 or more for polygons, -1 for a mixture."""
+    shapes: int
     smallest: float
     """Radius in pixels."""
     largest: float
@@ -100,7 +101,7 @@ class DeadLeaves(Texture):
             seed=new_seed(rng),
             palette=sample_palette(rng, integer(rng, 4, 10)),
             corners=choose(rng, [0, 0, 4, 4, 3, -1, -1, -1]),
-            figures=integer(rng, 100, 260),
+            shapes=integer(rng, 100, 260),
             smallest=uniform(rng, 2.0, 6.0),
             largest=uniform(rng, 0.12, 0.25),
             grain=uniform(rng, 0.03, 0.12),
@@ -109,18 +110,18 @@ class DeadLeaves(Texture):
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
         low, high = self.smallest, self.largest * self.size
-        share = rng.uniform(0.0, 1.0, self.figures)
+        share = rng.uniform(0.0, 1.0, self.shapes)
         radii = (low**-2 + share * (high**-2 - low**-2)) ** -0.5
-        # Small figures on a heap of big ones; a heap the other way round shows only the big ones.
-        big = self.figures // 6
+        # Small shapes lie over big ones; the other way round only the big ones would show.
+        big = self.shapes // 6
         radii[:big] = rng.uniform(0.4 * high, high, big)
-        top, ramp = heap_of_figures(rng, self.size, radii, self.corners)
-        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.figures + 1)]
-        colors *= rng.uniform(0.7, 1.25, (self.figures + 1, 1)).astype(np.float32)
-        slopes = rng.normal(0.0, 0.25, self.figures + 1).astype(np.float32)
-        # Each figure shows its own piece of the noise, as each leaf has its own veins.
+        top, ramp = overlapping_shapes(rng, self.size, radii, self.corners)
+        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.shapes + 1)]
+        colors *= rng.uniform(0.7, 1.25, (self.shapes + 1, 1)).astype(np.float32)
+        slopes = rng.normal(0.0, 0.25, self.shapes + 1).astype(np.float32)
+        # Each shape shows its own part of the noise, as each leaf has its own veins.
         noise = spectral_noise(rng, self.size, 0.8, 4).ravel()
-        shift = rng.integers(0, self.size**2, self.figures + 1)[top].ravel()
+        shift = rng.integers(0, self.size**2, self.shapes + 1)[top].ravel()
         detail = noise[(np.arange(self.size**2) + shift) % self.size**2].reshape(top.shape)
         light = 1 + slopes[top] * ramp + np.float32(0.13) * detail
         return finish(flat_colors(top, colors) * light, rng, self.grain)
@@ -128,12 +129,12 @@ class DeadLeaves(Texture):
 
 @dataclass(frozen=True)
 class BlurredShapes(Texture):
-    """Bright figures out of focus, over and through each other: bokeh, stained walls, watercolour."""
+    """Blurred overlapping shapes: bokeh, stained walls, watercolour."""
 
     size: int
     seed: int
     palette: Palette
-    figures: int
+    shapes: int
     blur: float
     """Standard deviation of the blur as a share of the picture."""
     grain: float
@@ -146,7 +147,7 @@ class BlurredShapes(Texture):
             size=size,
             seed=new_seed(rng),
             palette=sample_palette(rng, integer(rng, 4, 8)),
-            figures=integer(rng, 25, 90),
+            shapes=integer(rng, 25, 90),
             blur=log_uniform(rng, 0.004, 0.02),
             grain=uniform(rng, 0.05, 0.12),
         )
@@ -154,9 +155,9 @@ class BlurredShapes(Texture):
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
         size = self.size
-        radii = size * np.exp(rng.uniform(np.log(0.03), np.log(0.18), self.figures))
-        top, _ = heap_of_figures(rng, size, radii, -1)
-        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.figures + 1)]
+        radii = size * np.exp(rng.uniform(np.log(0.03), np.log(0.18), self.shapes))
+        top, _ = overlapping_shapes(rng, size, radii, -1)
+        colors = np.array(self.palette, np.float32)[rng.integers(0, len(self.palette), self.shapes + 1)]
         fy, fx = fft.fftfreq(size).astype(np.float32), fft.rfftfreq(size).astype(np.float32)
         gain = np.exp(-2 * (np.pi * self.blur * size) ** 2 * (fx[None, :] ** 2 + fy[:, None] ** 2))
         spectrum = fft.rfft2(flat_colors(top, colors)) * gain.astype(np.float32)
@@ -167,15 +168,15 @@ class BlurredShapes(Texture):
 
 @dataclass(frozen=True)
 class GlyphRows(Texture):
-    """Lines of words in an alphabet that never was: print, signs, labels."""
+    """Lines of words in an invented alphabet: print, signs, labels."""
 
     size: int
     seed: int
     palette: Palette
-    """Paper first, then inks."""
+    """The paper, then the inks."""
     lines: int
     letters: int
-    """Places for letters in a line."""
+    """Letters and spaces in a line."""
     alphabet: int
     """Number of different letters."""
     grain: float

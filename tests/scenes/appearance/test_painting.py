@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from scenes.appearance.painting import finish, mix, smooth_step, to_bytes, unit_grid
-from scenes.textures.cells import nearest_seeds
-from scenes.textures.marks import heap_of_figures
+from scenes.textures.cells import cellular_noise
+from scenes.textures.collages import overlapping_shapes
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_grain_and_bytes_are_those_of_numpy(picture: np.ndarray, precision: type
 def test_nearest_seeds_are_the_nearest_of_the_periodic_points() -> None:
     cells, jitter = 5, 0.8
     x, y = unit_grid(48)
-    cell, first, second = nearest_seeds(np.random.default_rng(3), x, y, cells, jitter)
+    cell, first, second = cellular_noise(np.random.default_rng(3), x, y, cells, jitter)
     points = 0.5 + jitter * np.random.default_rng(3).uniform(-0.5, 0.5, (2, cells, cells))
     grid = np.stack([points[0] + np.arange(cells), points[1] + np.arange(cells)[:, None]], -1).reshape(-1, 2)
     tree = cKDTree(grid, boxsize=cells)
@@ -61,9 +61,9 @@ def test_nearest_seeds_are_the_nearest_of_the_periodic_points() -> None:
     np.testing.assert_array_equal(cell[apart], index[..., 0][apart])
 
 
-def test_figures_on_a_heap_wrap_around_and_the_last_is_on_top() -> None:
+def test_overlapping_shapes_wrap_around_and_the_last_is_on_top() -> None:
     size, radii = 32, np.array([6.0, 5.0, 4.0])
-    top, _ = heap_of_figures(np.random.default_rng(4), size, radii, 0)
+    top, _ = overlapping_shapes(np.random.default_rng(4), size, radii, 0)
     rng = np.random.default_rng(4)
     centres = rng.integers(0, size, (3, 2))
     rng.uniform(0, 2 * np.pi, 3)

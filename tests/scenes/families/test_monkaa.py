@@ -15,7 +15,7 @@ from scenes.families.monkaa import PLACES, MonkaaConfig
 from scenes.landscapes.terrain import NEAREST_SHARE
 from scenes.serialization import scene_from_json, scene_to_json
 from scenes.spec import Scene
-from tests.scenes.landscapes import encloses, heights_of_feet, look, nearest_m, world_vertices
+from tests.scenes.families.landscapes import encloses, first_hits, heights_of_feet, nearest_m, world_vertices
 
 SMALL = MonkaaConfig(
     width=96,
@@ -46,15 +46,15 @@ def test_the_same_seed_gives_the_same_scene_and_json_keeps_it() -> None:
 
 @settings(max_examples=4, deadline=None)
 @given(seed=seeds)
-def test_neither_eye_is_ever_inside_or_near_anything(seed: int) -> None:
+def test_neither_camera_is_ever_inside_or_near_anything(seed: int) -> None:
     scene = sampled(seed, FEW)
     geometry = SceneGeometry(scene)
     closest = scene.camera.disparity_metres / (NEAREST_SHARE * scene.camera.width)
     for time in (0.0, 11.5, 23.0):
-        for eye in ("left", "right"):
-            position = scene.camera.pose(eye, time)[:3, 3]
+        for view in ("left", "right"):
+            position = scene.camera.pose(view, time)[:3, 3]
             # The ground below the image may be nearer than what is in it.
-            assert nearest_m(geometry, time, eye) > 0.3 * closest
+            assert nearest_m(geometry, time, view) > 0.3 * closest
             for index, thing in enumerate(scene.objects):
                 if thing.name in ("ground", "cave"):
                     assert abs(encloses(geometry, index, position, time)) < 0.02
@@ -113,7 +113,7 @@ def test_what_the_camera_sees_over_many_scenes() -> None:
     disparities, places, seen_creatures = [], set(), 0
     for seed in range(14):
         scene = sampled(seed)
-        seen = look(scene, SceneGeometry(scene))
+        seen = first_hits(scene, SceneGeometry(scene))
         near = seen.disparity_960[seen.disparity_960 > 0]
         assert near.max() < 1.15 * NEAREST_SHARE * 960
         assert np.percentile(near, 1) < 0.6 * np.percentile(near, 95)

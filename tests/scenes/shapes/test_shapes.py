@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scenes.geometry.mesh import Mesh
 from scenes.serialization import from_plain, to_plain
 from scenes.shapes import SHAPES
-from scenes.shapes.metric import MetricShape
+from scenes.shapes.anchored import MetricShape
 from scenes.shapes.solids.basic import Box, Ellipsoid
 from scenes.shapes.solids.extruded import HoledPlate
 from scenes.shapes.solids.organic import Terrain
@@ -100,8 +100,8 @@ def test_texture_coordinates_are_in_local_units(name: str) -> None:
     """A texture is neither smeared nor squeezed: most of the surface is mapped at about its own size."""
     shape = drawn(name, 5)
     mesh = shape.mesh()
-    # Shapes made to measure have theirs in metres.
-    size = shape.half_extent_m if isinstance(shape, MetricShape) else 1.0
+    # Metric shapes have theirs in metres.
+    size = shape.frame.half_extent if isinstance(shape, MetricShape) else 1.0
     corners, uv = size * mesh.vertices[mesh.triangles], mesh.corner_uv.astype(np.float64)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     one, two = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from scenes.landscapes.characters import Coat, Figure, sample_creature
+from scenes.landscapes.characters import Character, Coat, sample_creature
 from scenes.landscapes.people import sample_person
 from scenes.motion.deformations import DEFORMATIONS
 from scenes.motion.deformations.articulated import Articulated, Joint
@@ -28,7 +28,7 @@ ARM = (
 """A bent arm: at a quarter of its period the upper arm points 30, the forearm 90 degrees from the x axis."""
 
 
-def figure(seed: int) -> Figure:
+def character(seed: int) -> Character:
     rng = np.random.default_rng(seed)
     return sample_creature(rng, Coat(100, 0.05, 24)) if seed % 2 else sample_person(rng, 24)
 
@@ -63,8 +63,8 @@ def test_parts_of_one_body_move_as_one_whatever_their_mesh_coordinates() -> None
 
 @settings(max_examples=12, deadline=None)
 @given(seed=seeds, time=st.floats(-5.0, 200.0))
-def test_the_lowest_foot_of_a_figure_stays_on_the_ground(seed: int, time: float) -> None:
-    body = figure(seed)
+def test_the_lowest_foot_of_a_character_stays_on_the_ground(seed: int, time: float) -> None:
+    body = character(seed)
     if not body.feet:
         return
     motion = Articulated(body.joints, body.period_frames, feet=body.feet)
@@ -81,8 +81,8 @@ def _step(motion: Deformation, rest: NDArray[np.float64], time: float, by: float
 
 @settings(max_examples=10, deadline=None)
 @given(seed=seeds)
-def test_figures_move_smoothly_and_not_far(seed: int) -> None:
-    body = figure(seed)
+def test_characters_move_smoothly_and_not_far(seed: int) -> None:
+    body = character(seed)
     part = body.parts[0]
     motion = body.deformation(part)
     rest = part.shape.mesh().vertices[::7]
@@ -99,8 +99,8 @@ def test_figures_move_smoothly_and_not_far(seed: int) -> None:
 
 @settings(max_examples=10, deadline=None)
 @given(seed=seeds)
-def test_a_figures_skin_is_stretched_only_about_its_joints(seed: int) -> None:
-    body = figure(seed)
+def test_a_characters_skin_is_stretched_only_about_its_joints(seed: int) -> None:
+    body = character(seed)
     part = body.parts[0]
     mesh, motion = part.shape.mesh(), body.deformation(part)
     edges = mesh.triangles[:, [0, 1]]
@@ -127,7 +127,7 @@ def test_what_hangs_sways_at_its_lower_end() -> None:
 
 
 @pytest.mark.parametrize(
-    "motion", [Sway(0.1, 20.0, 30.0, 0.2, -0.9, 0.8), figure(3).deformation(figure(3).parts[0])]
+    "motion", [Sway(0.1, 20.0, 30.0, 0.2, -0.9, 0.8), character(3).deformation(character(3).parts[0])]
 )
 def test_a_deformation_survives_json(motion: Deformation) -> None:
     kind = DEFORMATIONS[type(motion).__name__]

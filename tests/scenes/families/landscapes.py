@@ -1,4 +1,4 @@
-"""What tests of the landscape families look at: where things are at an instant, and what the left eye sees."""
+"""What tests of the landscape families look at: where things are at an instant, and what the left view shows."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from scenes.spec import Scene
 
 
 @dataclass(frozen=True)
-class Seen:
-    """First hits of the rays through the pixels' centres of the left eye."""
+class FirstHits:
+    """First hits of the rays through the pixels' centres of the left view."""
 
     disparity_960: NDArray[np.float64]
     """(H, W) disparity in pixels of an image 960 pixels wide, 0 for the sky."""
@@ -23,12 +23,14 @@ class Seen:
     """(H, W) object index, -1 for the sky."""
 
 
-def look(scene: Scene, geometry: SceneGeometry, time_frames: float = 0.0) -> Seen:
+def first_hits(scene: Scene, geometry: SceneGeometry, time_frames: float = 0.0) -> FirstHits:
     camera = scene.camera
     rows, columns = np.divmod(np.arange(camera.height * camera.width), camera.width)
     hits = SceneRayCaster(geometry).cast("left", time_frames, rows, columns)
     shape = (camera.height, camera.width)
-    return Seen((hits.disparity * 960 / camera.width).reshape(shape), hits.object_index.reshape(shape) - 1)
+    return FirstHits(
+        (hits.disparity * 960 / camera.width).reshape(shape), hits.object_index.reshape(shape) - 1
+    )
 
 
 def world_vertices(geometry: SceneGeometry, index: int, time_frames: float) -> NDArray[np.float64]:
@@ -38,9 +40,9 @@ def world_vertices(geometry: SceneGeometry, index: int, time_frames: float) -> N
     return vertices
 
 
-def nearest_m(geometry: SceneGeometry, time_frames: float, eye: str) -> float:
-    """Distance from an eye to the nearest triangle of anything."""
-    position = geometry.scene.camera.pose(eye, time_frames)[:3, 3]
+def nearest_m(geometry: SceneGeometry, time_frames: float, view: str) -> float:
+    """Distance from a view's camera to the nearest triangle of anything."""
+    position = geometry.scene.camera.pose(view, time_frames)[:3, 3]
     corners = geometry.vertices(time_frames)[geometry.triangles]
     # Only triangles whose bounding ball comes near are worth the exact distance.
     centre = corners.mean(axis=1)

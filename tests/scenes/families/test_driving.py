@@ -72,7 +72,7 @@ def test_streets_have_what_streets_have() -> None:
     for scene in scenes:
         for kind in {type(thing.shape).__name__ for thing in scene.objects}:
             seen[kind] += 1
-    for kind in ("RoadStrip", "RoadPaint", "Kerb", "CarBody", "CarGlass", "Wheel", "LampPost"):
+    for kind in ("RoadStrip", "RoadMarkings", "Kerb", "CarBody", "CarGlass", "Wheel", "LampPost"):
         assert seen[kind] == len(scenes), kind
     for kind in ("HouseWalls", "HouseWindows", "TreeCrown", "PersonTop", "SignFace", "Fence", "VanBody"):
         assert seen[kind] >= 2, kind
@@ -170,20 +170,20 @@ def test_wheels_roll_without_slipping(streets: list[Scene]) -> None:
     assert rolled > 20
 
 
-def test_nothing_comes_near_either_eye_at_any_time(streets: list[Scene]) -> None:
+def test_nothing_comes_near_either_camera_at_any_time(streets: list[Scene]) -> None:
     for scene in streets:
         for time in np.linspace(-0.5, scene.frames - 0.5, 6):
-            eyes = np.stack([scene.camera.pose(eye, time)[:3, 3] for eye in ("left", "right")])
-            assert eyes[:, 2].min() > 0.9 * BRIEF.camera_height_m[0]
+            cameras = np.stack([scene.camera.pose(view, time)[:3, 3] for view in ("left", "right")])
+            assert cameras[:, 2].min() > 0.9 * BRIEF.camera_height_m[0]
             for thing in scene.objects:
                 if thing.name.startswith(UNDERFOOT):
                     continue
                 pose = thing.pose(time)
                 middle, reach = pose[:3, 3], np.linalg.norm(pose[:3, :3])
-                if np.linalg.norm(eyes - middle, axis=1).min() > reach + BRIEF.clearance_m:
+                if np.linalg.norm(cameras - middle, axis=1).min() > reach + BRIEF.clearance_m:
                     continue
                 surface = trimesh.Trimesh(corners(thing, time), thing.shape.mesh().triangles, process=False)
-                _, distance, _ = trimesh.proximity.closest_point_naive(surface, eyes)
+                _, distance, _ = trimesh.proximity.closest_point_naive(surface, cameras)
                 assert distance.min() > BRIEF.clearance_m, thing.name
 
 
@@ -218,11 +218,11 @@ def test_config_bounds_are_respected() -> None:
 
 
 def disparity_shares(scene: Scene, time_frames: float = 0.0) -> NDArray[np.float64]:
-    """(H, W) disparity seen by the left eye as a share of the image width, by trimesh's ray caster; 0 for sky."""
+    """(H, W) disparity of the left view as a share of the image width, by trimesh's ray caster; 0 for sky."""
     camera = scene.camera
-    to_eye = np.linalg.inv(camera.pose("left", time_frames))
+    to_left = np.linalg.inv(camera.pose("left", time_frames))
     triangles = np.concatenate([corners(t, time_frames)[t.shape.mesh().triangles] for t in scene.objects])
-    local = triangles.reshape(-1, 3) @ to_eye[:3, :3].T + to_eye[:3, 3]
+    local = triangles.reshape(-1, 3) @ to_left[:3, :3].T + to_left[:3, 3]
     world = trimesh.Trimesh(local, np.arange(len(local)).reshape(-1, 3), process=False)
     x = (np.arange(camera.width) + 0.5 - camera.width / 2) / camera.focal_px
     y = (camera.height / 2 - np.arange(camera.height) - 0.5) / camera.focal_px

@@ -15,7 +15,14 @@ from scenes.families.sintel import SintelConfig
 from scenes.landscapes.terrain import NEAREST_SHARE
 from scenes.serialization import scene_from_json, scene_to_json
 from scenes.spec import Scene
-from tests.scenes.landscapes import encloses, ground_below, heights_of_feet, look, nearest_m, world_vertices
+from tests.scenes.families.landscapes import (
+    encloses,
+    first_hits,
+    ground_below,
+    heights_of_feet,
+    nearest_m,
+    world_vertices,
+)
 
 SMALL = SintelConfig(
     width=96, height=54, people=(1, 2), trees=(4, 6), structures=(4, 6), boulders=(5, 8), plants=(4, 6)
@@ -39,15 +46,15 @@ def test_the_same_seed_gives_the_same_scene_and_json_keeps_it() -> None:
 
 @settings(max_examples=4, deadline=None)
 @given(seed=seeds)
-def test_neither_eye_is_ever_inside_or_near_anything(seed: int) -> None:
+def test_neither_camera_is_ever_inside_or_near_anything(seed: int) -> None:
     scene = sampled(seed, FEW)
     geometry = SceneGeometry(scene)
     closest = scene.camera.disparity_metres / (NEAREST_SHARE * scene.camera.width)
     for time in (0.0, 23.0):
-        for eye in ("left", "right"):
-            position = scene.camera.pose(eye, time)[:3, 3]
+        for view in ("left", "right"):
+            position = scene.camera.pose(view, time)[:3, 3]
             # The ground below the image may be nearer than what is in it.
-            assert nearest_m(geometry, time, eye) > 0.3 * closest
+            assert nearest_m(geometry, time, view) > 0.3 * closest
             assert abs(encloses(geometry, 0, position, time)) < 0.02
 
 
@@ -91,8 +98,8 @@ def test_the_final_pass_is_focused_on_the_first_person_and_its_fog_fits_the_scen
     for seed in range(12):
         scene = sampled(seed)
         body = next(thing for thing in scene.objects if thing.name.startswith("person 0 cloth"))
-        eye = scene.camera.pose("left", 0.0)
-        depth = float((body.pose(0.0)[:3, 3] - eye[:3, 3]) @ -eye[:3, 2])
+        camera = scene.camera.pose("left", 0.0)
+        depth = float((body.pose(0.0)[:3, 3] - camera[:3, 3]) @ -camera[:3, 2])
         assert scene.final.focus_m == pytest.approx(depth, rel=0.12)
         assert 0 < scene.final.shutter_frames < 1
         assert scene.final.f_number > 1
@@ -107,7 +114,7 @@ def test_what_the_camera_sees_over_many_scenes() -> None:
     disparities, places, seen_people, sky = [], set(), 0, []
     for seed in range(16):
         scene = sampled(seed)
-        seen = look(scene, SceneGeometry(scene))
+        seen = first_hits(scene, SceneGeometry(scene))
         near = seen.disparity_960[seen.disparity_960 > 0]
         assert near.max() < 1.15 * NEAREST_SHARE * 960
         share = np.bincount(seen.index[seen.index >= 0], minlength=len(scene.objects)) / seen.index.size
