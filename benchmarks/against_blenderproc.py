@@ -224,7 +224,7 @@ def _results(process: subprocess.Popen[str]) -> list[dict]:
 
 
 def _left_picture(python: Path, path: Path) -> NDArray[np.float32]:
-    """(H, W, 3) radiance of the left eye. HDF5 is read by BlenderProc's Python: ours has no use for it."""
+    """(H, W, 3) radiance of the left view. HDF5 is read by BlenderProc's Python: ours has no use for it."""
     code = (
         "import h5py, numpy, sys; colors = numpy.asarray(h5py.File(sys.argv[1])['colors'], 'f4'); "
         "numpy.save(sys.argv[2], colors[0])"

@@ -65,7 +65,7 @@ VARIANTS = (
 
 
 def render(scene: Scene, variant: Variant, scratch: Path) -> tuple[NDArray[np.float32], float]:
-    """Linear radiance of the left eye at the first frame, and the CPU seconds it took once the world stood."""
+    """Linear radiance of the left view at the first frame, and the CPU seconds it took once the world stood."""
     with quiet(scratch / "blender.log"):
         blender_scene = start_empty_file(CyclesSettings(samples=variant.samples))
         world = build_world(SceneGeometry(scene), blender_scene)

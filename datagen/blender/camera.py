@@ -1,4 +1,4 @@
-"""Rendering one eye at one instant, and reading what Cycles wrote."""
+"""Rendering one view at one instant, and reading what Cycles wrote."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from datagen.blender.build import BuiltWorld, place
 
 
-def render_view(world: BuiltWorld, eye: str, frame: int, scratch: Path) -> NDArray[np.float32]:
-    """(H, W, 3) scene-linear RGB of one eye of one frame, denoised.
+def render_view(world: BuiltWorld, view: str, frame: int, scratch: Path) -> NDArray[np.float32]:
+    """(H, W, 3) scene-linear RGB of one view of one frame, denoised.
 
     `scratch` is an existing folder for Blender's temporary file.
     """
-    place(world, eye, float(frame))
-    # The two eyes must not share their noise: the same pattern in both would match at disparity 0.
-    return render_radiance(world, f"{eye}_{frame}", 2 * frame + (eye == "right"), scratch)
+    place(world, view, float(frame))
+    # The two views must not share their noise: the same pattern in both would match at disparity 0.
+    return render_radiance(world, f"{view}_{frame}", 2 * frame + (view == "right"), scratch)
 
 
 def render_radiance(world: BuiltWorld, name: str, seed: int, scratch: Path) -> NDArray[np.float32]:

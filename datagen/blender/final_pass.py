@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from datagen.blender.build import BuiltWorld, place
 from datagen.blender.camera import render_radiance
-from datagen.dataset.layout import EYES, Eye
+from datagen.dataset.layout import VIEWS, View
 from scenes.spec import FinalPass, Fog
 
 SHUTTER_FRAME = 10
@@ -30,8 +30,8 @@ _FINAL_SEED = 1 << 20
 
 def render_final(
     world: BuiltWorld, frame: int, exposure: float, scratch: Path
-) -> dict[Eye, NDArray[np.float32]]:
-    """(H, W, 3) scene-linear RGB of each eye with motion blur, defocus and fog.
+) -> dict[View, NDArray[np.float32]]:
+    """(H, W, 3) scene-linear RGB of each view with motion blur, defocus and fog.
 
     exposure: The factor the pictures will be exposed with, which the fog's colour is given after.
     """
@@ -41,15 +41,15 @@ def render_final(
             stack.enter_context(_lens(world, final))
         if final.fog is not None:
             stack.enter_context(_foggy(world, final.fog, exposure))
-        return {eye: _render_eye(world, eye, frame, scratch) for eye in EYES}
+        return {view: _render_view(world, view, frame, scratch) for view in VIEWS}
 
 
-def _render_eye(world: BuiltWorld, eye: Eye, frame: int, scratch: Path) -> NDArray[np.float32]:
-    place(world, eye, float(frame))
+def _render_view(world: BuiltWorld, view: View, frame: int, scratch: Path) -> NDArray[np.float32]:
+    place(world, view, float(frame))
     shutter_frames = world.scene.final.shutter_frames
-    with _open_shutter(world, eye, frame, shutter_frames) if shutter_frames > 0 else nullcontext():
-        seed = _FINAL_SEED + 2 * frame + (eye == "right")
-        return render_radiance(world, f"final_{eye}_{frame}", seed, scratch)
+    with _open_shutter(world, view, frame, shutter_frames) if shutter_frames > 0 else nullcontext():
+        seed = _FINAL_SEED + 2 * frame + (view == "right")
+        return render_radiance(world, f"final_{view}_{frame}", seed, scratch)
 
 
 @contextmanager
@@ -65,7 +65,7 @@ def _lens(world: BuiltWorld, final: FinalPass) -> Iterator[None]:
 
 
 @contextmanager
-def _open_shutter(world: BuiltWorld, eye: str, frame: int, shutter_frames: float) -> Iterator[None]:
+def _open_shutter(world: BuiltWorld, view: str, frame: int, shutter_frames: float) -> Iterator[None]:
     """Key frames of everything that moves at the shutter's opening, middle and closing.
 
     Cycles takes the motion at those three instants and goes straight between them.
@@ -78,7 +78,7 @@ def _open_shutter(world: BuiltWorld, eye: str, frame: int, shutter_frames: float
         for thing, block in zip(world.scene.objects, world.objects, strict=True)
         if len(thing.motion.times_frames) > 1
     ]
-    moving.append((world.camera, [world.scene.camera.pose(eye, time) for _, time in keys]))
+    moving.append((world.camera, [world.scene.camera.pose(view, time) for _, time in keys]))
     deforming = [k for k, thing in enumerate(world.scene.objects) if thing.deformation is not None]
     try:
         for block, poses in moving:
@@ -98,7 +98,7 @@ def _open_shutter(world: BuiltWorld, eye: str, frame: int, shutter_frames: float
         for index in deforming:
             world.objects[index].shape_key_clear()
             world.deformed_at.pop(index, None)
-        place(world, eye, float(frame))
+        place(world, view, float(frame))
 
 
 def _key_poses(block: bpy.types.Object, poses: list[NDArray[np.float64]], clocks: list[float]) -> None:
@@ -169,7 +169,7 @@ def _add_fog(tree: bpy.types.NodeTree, fog: Fog, exposure: float, sky: bool) -> 
 
 
 def _through_distance(tree: bpy.types.NodeTree, visibility_m: float) -> bpy.types.NodeSocket:
-    """Share of a surface's light that reaches the eye: exp(-distance / visibility)."""
+    """Share of a surface's light that reaches the camera: exp(-distance / visibility)."""
     distance = tree.nodes.new("ShaderNodeCameraData").outputs["View Distance"]
     return _math(tree, "EXPONENT", _math(tree, "MULTIPLY", distance, -1.0 / visibility_m))
 

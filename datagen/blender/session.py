@@ -88,7 +88,7 @@ def _configure_cycles(scene: bpy.types.Scene, settings: CyclesSettings) -> None:
     cycles.caustics_reflective = False
     cycles.caustics_refractive = False
     cycles.sample_clamp_indirect = 4.0
-    # Both eyes and all frames see the same world: keep its images and acceleration structures.
+    # Both views and all frames show the same world: keep its images and acceleration structures.
     scene.render.use_persistent_data = True
 
 

@@ -1,7 +1,7 @@
 """Where everything of a data set lies: the FlyingThings3D tree, and more beside it.
 
     recipe.yaml
-    frames_cleanpass/TRAIN/A/0003/left/0006.png     one file an eye and frame
+    frames_cleanpass/TRAIN/A/0003/left/0006.png     one file a view and frame
     camera_data/TRAIN/A/0003/camera_data.txt        one file a scene
     scenes/TRAIN/A/0003.json                        the Scene record
     manifest/TRAIN/A/0003.json                      written last: a scene is there if its manifest is
@@ -21,8 +21,10 @@ from datagen.errors import DatasetError
 from stereoforge_kit.files import LocalTree, Tree
 
 SPLITS = ("train", "val", "test")
-Eye = Literal["left", "right"]
-EYES: tuple[Eye, Eye] = ("left", "right")
+SceneKey = tuple[str, int]
+"""A scene of a data set: (split, number)."""
+View = Literal["left", "right"]
+VIEWS: tuple[View, View] = ("left", "right")
 Direction = Literal["into_future", "into_past"]
 DIRECTIONS: tuple[Direction, Direction] = ("into_future", "into_past")
 """To the instant one frame later, and one frame earlier."""
@@ -38,10 +40,10 @@ class Kind:
 
     folder: str
     extension: str
-    per_eye: bool = True
-    """One file an eye and frame; otherwise one file a scene, named after the kind."""
+    per_view: bool = True
+    """One file a view and frame; otherwise one file a scene, named after the kind."""
     over_time: bool = False
-    """One file a direction, eye and frame."""
+    """One file a direction, view and frame."""
 
     @property
     def directions(self) -> tuple[Direction | None, ...]:
@@ -63,7 +65,7 @@ KINDS = {
         Kind("optical_flow", ".pfm", over_time=True),
         Kind("disparity_change", ".pfm", over_time=True),
         Kind("motion_boundaries", ".pgm", over_time=True),
-        Kind("camera_data", ".txt", per_eye=False),
+        Kind("camera_data", ".txt", per_view=False),
     )
 }
 """Every kind of data file by its name, which is also its folder's."""
@@ -91,27 +93,27 @@ class Layout:
         kind: str,
         split: str,
         scene: int,
-        eye: str | None = None,
+        view: str | None = None,
         frame: int | None = None,
         direction: Direction | None = None,
     ) -> Path:
-        """A data file. Kinds with files an eye need `eye` and the frame's number (`FIRST_FRAME` + t), those
+        """A data file. Kinds with files a view need `view` and the frame's number (`FIRST_FRAME` + t), those
         over time a direction as well."""
         entry, folder = KINDS[kind], self.scene_folder(kind, split, scene)
-        if not entry.per_eye:
+        if not entry.per_view:
             return folder / f"{entry.folder}{entry.extension}"
-        if eye not in EYES or frame is None or frame < FIRST_FRAME:
+        if view not in VIEWS or frame is None or frame < FIRST_FRAME:
             raise ValueError(
-                f"a file of {kind} needs an eye, left or right, and a frame from {FIRST_FRAME} up, "
-                f"got {eye!r} and {frame}"
+                f"a file of {kind} needs a view, left or right, and a frame from {FIRST_FRAME} up, "
+                f"got {view!r} and {frame}"
             )
         if direction not in entry.directions:
             raise ValueError(f"a file of {kind} has no direction {direction!r}")
         name = _number(frame)
         if kind == "optical_flow":
             towards = "IntoFuture" if direction == "into_future" else "IntoPast"
-            name = f"OpticalFlow{towards}_{name}_{eye[0].upper()}"
-        return folder / (direction or "") / eye / f"{name}{entry.extension}"
+            name = f"OpticalFlow{towards}_{name}_{view[0].upper()}"
+        return folder / (direction or "") / view / f"{name}{entry.extension}"
 
     def scene_record(self, split: str, scene: int) -> Path:
         return self._group("scenes", split) / f"{_number(scene)}.json"
@@ -126,7 +128,7 @@ class Layout:
 
     @property
     def assets(self) -> Path:
-        """The folder of the user's own files, prepared (`datagen.recipe.assets`)."""
+        """The folder of the prepared user assets (`datagen.recipe.assets`)."""
         return self.root / "assets"
 
     @property

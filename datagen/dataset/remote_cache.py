@@ -14,7 +14,7 @@ from stereoforge_kit.files import LocalTree, Tree, write_bytes
 
 
 @dataclass(frozen=True)
-class MirroredLayout(Layout):
+class RemoteLayout(Layout):
     """Paths in the folder of copies; `local` fetches what is not there yet."""
 
     source: Tree
@@ -55,12 +55,12 @@ class MirroredLayout(Layout):
             copies.remove(self.relative(path))
 
 
-def open_mirror(tree: Tree, folder: Path | None = None) -> MirroredLayout:
+def open_remote(tree: Tree, folder: Path | None = None) -> RemoteLayout:
     """The layout of a data set behind a URL, with copies in `folder` or the user's cache.
 
     Raises DatasetError where there is no data set.
     """
-    layout = MirroredLayout(folder or _cache_folder(tree), tree)
+    layout = RemoteLayout(folder or _cache_folder(tree), tree)
     with suppress(FileNotFoundError):
         layout.recipe.unlink()  # It may have grown.
     layout.local(layout.recipe)

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.dataset.integrity import compare
-from datagen.dataset.layout import EYES, RENDER_PASSES, SPLITS, Direction, Eye, Layout
+from datagen.dataset.layout import RENDER_PASSES, SPLITS, VIEWS, Direction, Layout, View
 from datagen.dataset.manifest import FileEntry, read_manifest
-from datagen.dataset.remote_cache import open_mirror
+from datagen.dataset.remote_cache import open_remote
 from datagen.errors import DatasetError
 from datagen.formats import (
     read_flow,
@@ -33,8 +33,8 @@ from stereoforge_kit.files import LocalTree, open_tree
 
 
 @dataclass(frozen=True)
-class EyeView:
-    """What one eye of a sample sees; shapes and meanings are those of `StereoSample`."""
+class SampleView:
+    """The arrays of one view of a sample; shapes and meanings are those of `StereoSample`."""
 
     image: NDArray[np.uint8]
     disparity: NDArray[np.float32]
@@ -131,39 +131,39 @@ class StereoSample:
         """(H, W) 0 sky, else 1 + index in the scene's objects."""
         return self._object_index("right")
 
-    def view(self, eye: Eye) -> EyeView:
-        """Everything of the "left" or "right" eye."""
-        if eye not in EYES:
-            raise ValueError(f"an eye is 'left' or 'right', not {eye!r}")
-        return EyeView(
-            image=getattr(self, eye),
-            disparity=getattr(self, f"disparity_{eye}"),
-            gradient=getattr(self, f"gradient_{eye}"),
-            gradient_valid=getattr(self, f"gradient_valid_{eye}"),
-            occlusion=getattr(self, f"occlusion_{eye}"),
-            object_index=getattr(self, f"object_index_{eye}"),
+    def view(self, view: View) -> SampleView:
+        """All arrays of the "left" or "right" view."""
+        if view not in VIEWS:
+            raise ValueError(f"a view is 'left' or 'right', not {view!r}")
+        return SampleView(
+            image=getattr(self, view),
+            disparity=getattr(self, f"disparity_{view}"),
+            gradient=getattr(self, f"gradient_{view}"),
+            gradient_valid=getattr(self, f"gradient_valid_{view}"),
+            occlusion=getattr(self, f"occlusion_{view}"),
+            object_index=getattr(self, f"object_index_{view}"),
         )
 
-    def material_index(self, eye: Eye) -> NDArray[np.uint16]:
+    def material_index(self, view: View) -> NDArray[np.uint16]:
         """(H, W) 0 sky, else 1 + index in the scene's materials. Needs the target, as the methods below do;
         what they return is read anew at each call."""
-        return self._extra("material_index", eye, read_png, (), np.uint16)
+        return self._extra("material_index", view, read_png, (), np.uint16)
 
-    def normals(self, eye: Eye) -> NDArray[np.float32]:
+    def normals(self, view: View) -> NDArray[np.float32]:
         """(H, W, 3) unit vectors in the camera's frame (x right, y up, z back), 0 for the sky."""
-        return self._extra("normals", eye, read_normals, (3,), np.float32)
+        return self._extra("normals", view, read_normals, (3,), np.float32)
 
-    def flow(self, eye: Eye, direction: Direction) -> NDArray[np.float32]:
+    def flow(self, view: View, direction: Direction) -> NDArray[np.float32]:
         """(H, W, 2) px [right, down] to where the pixel's point is one frame on; NaN invalid."""
-        return self._extra("optical_flow", eye, read_flow, (2,), np.float32, direction)
+        return self._extra("optical_flow", view, read_flow, (2,), np.float32, direction)
 
-    def disparity_change(self, eye: Eye, direction: Direction) -> NDArray[np.float32]:
+    def disparity_change(self, view: View, direction: Direction) -> NDArray[np.float32]:
         """(H, W) px the disparity of the pixel's point grows by until one frame on; NaN invalid."""
-        return self._extra("disparity_change", eye, read_pfm, (), np.float32, direction)
+        return self._extra("disparity_change", view, read_pfm, (), np.float32, direction)
 
-    def motion_boundaries(self, eye: Eye, direction: Direction) -> NDArray[np.bool_]:
+    def motion_boundaries(self, view: View, direction: Direction) -> NDArray[np.bool_]:
         """(H, W) where objects that move differently meet."""
-        return self._extra("motion_boundaries", eye, read_mask, (), np.bool_, direction)
+        return self._extra("motion_boundaries", view, read_mask, (), np.bool_, direction)
 
     @cached_property
     def scene_record(self) -> Scene:
@@ -197,35 +197,35 @@ class StereoSample:
     def _image_kind(self) -> str:
         return RENDER_PASSES[self.render_pass]
 
-    def _file(self, kind: str, eye: Eye, direction: Direction | None = None) -> Path:
-        return self.intact(self.layout.file(kind, self.split, self.scene, eye, self.frame, direction))
+    def _file(self, kind: str, view: View, direction: Direction | None = None) -> Path:
+        return self.intact(self.layout.file(kind, self.split, self.scene, view, self.frame, direction))
 
-    def _image(self, eye: Eye) -> NDArray[np.uint8]:
-        path = self._file(self._image_kind, eye)
+    def _image(self, view: View) -> NDArray[np.uint8]:
+        path = self._file(self._image_kind, view)
         image = read_png(path)
         self._check(path, image, (*self.size, 3), np.uint8)
         return image  # type: ignore[return-value]
 
-    def _disparity(self, eye: Eye) -> NDArray[np.float32]:
-        path = self._file("disparity", eye)
+    def _disparity(self, view: View) -> NDArray[np.float32]:
+        path = self._file("disparity", view)
         disparity = read_pfm(path)
         self._check(path, disparity, self.size, np.float32)
         return disparity
 
-    def _gradient(self, eye: Eye) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        path = self._file("disparity_gradient", eye)
+    def _gradient(self, view: View) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        path = self._file("disparity_gradient", view)
         gradient, valid = read_gradient(path)
         self._check(path, gradient, (*self.size, 2), np.float32)
         return gradient, valid
 
-    def _occlusion(self, eye: Eye) -> NDArray[np.uint8]:
-        path = self._file("occlusion", eye)
+    def _occlusion(self, view: View) -> NDArray[np.uint8]:
+        path = self._file("occlusion", view)
         labels = read_occlusion(path)
         self._check(path, labels, self.size, np.uint8)
         return labels
 
-    def _object_index(self, eye: Eye) -> NDArray[np.uint16]:
-        path = self._file("object_index", eye)
+    def _object_index(self, view: View) -> NDArray[np.uint16]:
+        path = self._file("object_index", view)
         index = read_png(path)
         self._check(path, index, self.size, np.uint16)
         return index  # type: ignore[return-value]
@@ -233,13 +233,13 @@ class StereoSample:
     def _extra(
         self,
         kind: str,
-        eye: Eye,
+        view: View,
         read: Callable[[Path], NDArray[Any]],
         channels: tuple[int, ...],
         dtype: type,
         direction: Direction | None = None,
     ) -> NDArray[Any]:
-        path = self._file(kind, eye, direction)
+        path = self._file(kind, view, direction)
         values = read(path)
         self._check(path, values, (*self.size, *channels), dtype)
         return values
@@ -320,7 +320,7 @@ def open_layout(root: Path | str) -> Layout:
     """
     tree = open_tree(root)
     if not isinstance(tree, LocalTree):
-        return open_mirror(tree)
+        return open_remote(tree)
     layout = Layout(tree.root)
     if not layout.root.is_dir():
         raise DatasetError(f"{layout.root}: there is no such folder")

@@ -27,9 +27,9 @@ class SetStatistics:
     disparity: NDArray[np.float32]
     """(P,) px, a regular subset of all frames' pixels."""
     occluded: NDArray[np.float64]
-    """(F,) share of each frame's pixels that another surface hides from the right eye."""
+    """(F,) share of each frame's pixels that are occluded in the right view."""
     out_of_frame: NDArray[np.float64]
-    """(F,) share of each frame's pixels that lie outside the right image."""
+    """(F,) share of each frame's pixels that lie out of the right view's frame."""
     visible_objects: NDArray[np.int64]
     """(F,) number of objects with at least one pixel."""
     textured: NDArray[np.float64]

@@ -1,7 +1,7 @@
 """The layout of KITTI 2015's stereo benchmark (Menze and Geiger, CVPR 2015; its devkit's readme and io code).
 
     training/image_2/000000_10.png       left image            training/image_3/...   right image
-    training/disp_occ_0/000000_10.png    all pixels            training/disp_noc_0/... those the other eye sees
+    training/disp_occ_0/000000_10.png    all pixels            training/disp_noc_0/... those visible in the right view
     training/obj_map/000000_10.png       0 background, else a vehicle's number (KITTI's foreground is its cars)
     training/calib_cam_to_cam/000000.txt projections of both cameras
 

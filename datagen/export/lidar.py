@@ -1,4 +1,4 @@
-"""Which pixels a spinning laser scanner at the left eye would measure."""
+"""Which pixels a spinning laser scanner at the left camera would measure."""
 
 from __future__ import annotations
 

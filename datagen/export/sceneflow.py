@@ -14,7 +14,7 @@ from datagen.dataset.manifest import read_manifest
 from datagen.dataset.samples import StereoDataset
 from stereoforge_kit.files import Tree
 
-KINDS = (*RENDER_PASSES.values(), "disparity", "camera_data")
+PUBLISHED_KINDS = (*RENDER_PASSES.values(), "disparity", "camera_data")
 
 
 def export_sceneflow(sets: Sequence[StereoDataset], out: Tree, progress: Callable[[int, int], None]) -> None:
@@ -26,7 +26,7 @@ def export_sceneflow(sets: Sequence[StereoDataset], out: Tree, progress: Callabl
             samples = list(group)
             manifest = read_manifest(layout.local(layout.manifest(frames.split, scene)))
             for entry in manifest.files:
-                if Path(entry.path).parts[0] in KINDS:
+                if Path(entry.path).parts[0] in PUBLISHED_KINDS:
                     out.write(entry.path, samples[0].intact(layout.root / entry.path).read_bytes())
             done += len(samples)
             progress(done, total)

@@ -12,7 +12,7 @@ import tarfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 
-from datagen.dataset.layout import EYES, KINDS, RENDER_PASSES, TARGETS
+from datagen.dataset.layout import KINDS, RENDER_PASSES, TARGETS, VIEWS
 from datagen.dataset.manifest import FileEntry, file_entry, read_manifest, seal
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.errors import DatasetError
@@ -73,9 +73,9 @@ def _add(tar: tarfile.TarFile, sample: StereoSample) -> str:
 
 def _members(sample: StereoSample) -> Iterator[tuple[str, bytes]]:
     for kind in (RENDER_PASSES[sample.render_pass], *TARGETS):
-        for eye in EYES if KINDS[kind].per_eye else ():
-            path = sample.layout.file(kind, sample.split, sample.scene, eye, sample.frame)
-            what = eye if kind in RENDER_PASSES.values() else f"{kind}_{eye}"
+        for view in VIEWS if KINDS[kind].per_view else ():
+            path = sample.layout.file(kind, sample.split, sample.scene, view, sample.frame)
+            what = view if kind in RENDER_PASSES.values() else f"{kind}_{view}"
             yield f"{what}{path.suffix}", sample.intact(path).read_bytes()
 
 

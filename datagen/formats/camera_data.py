@@ -4,7 +4,7 @@
     L T00 T01 ... T33
     R T00 T01 ... T33
 
-and an empty line after each frame; T is the row-major (4, 4) camera-to-world matrix of that eye.
+and an empty line after each frame; T is the row-major (4, 4) camera-to-world matrix of that view's camera.
 """
 
 from __future__ import annotations
@@ -64,14 +64,14 @@ def _numbers(matrix: Matrix) -> str:
     return " ".join(repr(float(value)) for value in matrix.flat)
 
 
-def _matrix(path: Path, frame: int, eye: str, line: str) -> Matrix:
+def _matrix(path: Path, frame: int, view: str, line: str) -> Matrix:
     words = line.split()
     try:
-        if words[0] != eye:
+        if words[0] != view:
             raise ValueError(f"it begins with {words[0][:20]!r}")
         matrix = np.array([float(word) for word in words[1:]]).reshape(4, 4)
         if not np.isfinite(matrix).all():
             raise ValueError("it is not finite")
     except ValueError as error:
-        raise FormatError(f"{path}: frame {frame} has no valid {eye!r} matrix: {error}") from error
+        raise FormatError(f"{path}: frame {frame} has no valid {view!r} matrix: {error}") from error
     return matrix

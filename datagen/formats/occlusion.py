@@ -1,6 +1,6 @@
 """Occlusion labels as grey PNG: 0 visible, 1 occluded, 2 out of the other frame; on disk 0, 255, 128.
 
-Any value above 0 therefore means "not visible in the other eye" to a reader that knows only two classes, as
+Any value above 0 therefore means "not visible in the other view" to a reader that knows only two classes, as
 Sintel's and FlyingThings3D's masks do.
 """
 

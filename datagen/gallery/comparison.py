@@ -25,7 +25,7 @@ SHOWN_FRAMES = 6
 
 
 @dataclass(frozen=True)
-class _Side:
+class _ComparedSet:
     """One of the two sets."""
 
     name: str
@@ -65,17 +65,17 @@ def write_comparison(
         DatasetError: For a folder that is no data set or has no finished scene, or for damaged files.
     """
     names = _names(Path(first), Path(second))
-    sides = [
-        _side(Path(root), name, min(scenes, SHOWN_FRAMES))
+    compared = [
+        _compared_set(Path(root), name, min(scenes, SHOWN_FRAMES))
         for root, name in zip((first, second), names, strict=True)
     ]
-    tick = Ticker(sum(len(side.samples) for side in sides), progress)
-    statistics = {side.name: measure(map(tick, side.samples)) for side in sides}
+    tick = Ticker(sum(len(one.samples) for one in compared), progress)
+    statistics = {one.name: measure(map(tick, one.samples)) for one in compared}
     page = render_page(
         "datagen.gallery",
         "comparison.html",
         title=f"{names[0]} and {names[1]}",
-        sides=sides,
+        compared=compared,
         rows=_rows(*statistics.values()),
         plots=[svg(figure) for figure in histograms(statistics)],
         measured=[len(one) for one in statistics.values()],
@@ -93,7 +93,7 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
     return f"{names[0]} (1)", f"{names[1]} (2)"
 
 
-def _side(root: Path, name: str, shown: int) -> _Side:
+def _compared_set(root: Path, name: str, shown: int) -> _ComparedSet:
     layout = open_layout(root)
     recipe = read_recipe(layout.recipe)
     splits = [split for split in SPLITS if layout.committed_scenes(split)]
@@ -102,15 +102,15 @@ def _side(root: Path, name: str, shown: int) -> _Side:
     frames = [sample for split in splits for sample in StereoDataset(root, split, recipe.passes[0])]
     lead = f"{recipe.family} at {recipe.world.width} × {recipe.world.height}, {len(frames)} stereo pairs"
     pictures = [shrunk(sample.left, LONGEST_SIDE_PX) for sample in evenly_spaced(frames, shown)]
-    return _Side(name, lead, evenly_spaced(frames, MEASURED_FRAMES), pictures)
+    return _ComparedSet(name, lead, evenly_spaced(frames, MEASURED_FRAMES), pictures)
 
 
 def _rows(first: SetStatistics, second: SetStatistics) -> list[_Row]:
     """Median and spread of every quantity in both, and how far apart the distributions are."""
     quantities = (
         ("Disparity of a pixel, px", "disparity", 1.0, 1),
-        ("Pixels hidden from the other eye, %", "occluded", 100.0, 1),
-        ("Pixels outside the other frame, %", "out_of_frame", 100.0, 1),
+        ("Occluded pixels, %", "occluded", 100.0, 1),
+        ("Pixels out of frame, %", "out_of_frame", 100.0, 1),
         ("Objects in view", "visible_objects", 1.0, 0),
         ("Textured pixels, %", "textured", 100.0, 0),
     )

@@ -144,12 +144,12 @@ def _first_frames(dataset: StereoDataset) -> list[StereoSample]:
 
 def _panel(sample: StereoSample, recipe: Recipe, nearest_px: float) -> FramePanel:
     low, middle, high = np.percentile(sample.disparity_left, (1, 50, 99))
-    hidden = (sample.occlusion_left > 0).mean()
+    not_visible = (sample.occlusion_left > 0).mean()
     objects = np.count_nonzero(np.unique(sample.object_index_left))
     gradient = np.where(sample.gradient_valid_left[..., None], sample.gradient_left, np.nan)
     pictures: tuple[tuple[str, Picture, int | None], ...] = (
         ("Disparity", disparity_picture(sample.disparity_left, nearest_px), 90),
-        ("Not visible to the right eye", occlusion_picture(sample.occlusion_left, sample.left), 85),
+        ("Not visible in the right view", occlusion_picture(sample.occlusion_left, sample.left), 85),
         ("Disparity gradient", gradient_picture(gradient, FULL_COLOR_GRADIENT), 90),
         ("Objects", index_picture(_thinned(sample.object_index_left)), None),
         *_extra_pictures(sample, recipe),
@@ -158,7 +158,7 @@ def _panel(sample: StereoSample, recipe: Recipe, nearest_px: float) -> FramePane
         name=sample.name,
         summary=(
             f"{objects} objects in view, disparity {low:.1f} to {high:.1f} px (1st to 99th percentile), "
-            f"median {middle:.1f} px; {hidden:.1%} of the left view is not visible to the right eye."
+            f"median {middle:.1f} px; {not_visible:.1%} of the left view is not visible in the right view."
         ),
         left=_small(sample.left),
         right=_small(sample.right),
@@ -220,8 +220,8 @@ def _tiles(
     values: tuple[tuple[str, str], ...] = (
         (f"{sum(len(layout.committed_scenes(split)) for split in splits)}", "finished scenes"),
         (f"{middle:.1f} px", f"median disparity; 98 % between {low:.1f} and {high:.1f} px"),
-        (f"{joined['occluded'].mean():.1%}", "of the pixels hidden from the other eye"),
-        (f"{joined['out_of_frame'].mean():.1%}", "of the pixels outside the other frame"),
+        (f"{joined['occluded'].mean():.1%}", "of the pixels occluded in the other view"),
+        (f"{joined['out_of_frame'].mean():.1%}", "of the pixels out of the other view's frame"),
         (f"{joined['visible_objects'].mean():.0f}", "objects in view, on average"),
         (f"{joined['textured'].mean():.0%}", "of the pixels textured"),
     )
@@ -255,7 +255,7 @@ def histograms(statistics: dict[str, SetStatistics], wanted: DisparityHistogram 
         )
     ]
     for name, factor, x_label, title in (
-        ("occluded", 100, "pixels hidden from the other eye, %", "Occlusion"),
+        ("occluded", 100, "occluded pixels, %", "Occlusion"),
         ("visible_objects", 1, "objects in view", "Objects"),
         ("textured", 100, "textured pixels, %", "Texture"),
     ):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import Eye
+from datagen.dataset.layout import View
 from datagen.ground_truth.labels import (
     OCCLUDED,
     OUT_OF_FRAME,
@@ -35,14 +35,14 @@ def derive_gradient(disparity: NDArray[np.float32]) -> tuple[NDArray[np.float32]
 
 
 def derive_occlusion(
-    eye: Eye, disparity: NDArray[np.float32], other: NDArray[np.float32]
+    view: View, disparity: NDArray[np.float32], other: NDArray[np.float32]
 ) -> NDArray[np.uint8]:
-    """(H, W) VISIBLE, OCCLUDED or OUT_OF_FRAME for the pixels of `eye`, from both views' disparities.
+    """(H, W) VISIBLE, OCCLUDED or OUT_OF_FRAME for the pixels of `view`, from both views' disparities.
 
     A point is occluded where both pixels it falls between in the other view are nearer by more than `NEARER_PX`
     (one alone may be the edge of a neighbour). Pixels without disparity count as visible.
     """
-    x = _position_in_other(eye, disparity)
+    x = _position_in_other(view, disparity)
     width = disparity.shape[1]
     columns = np.clip(np.nan_to_num(x) - 0.5, 0, width - 1)
     rows = np.arange(len(disparity))[:, None]
@@ -54,15 +54,17 @@ def derive_occlusion(
     return np.where((x < 0) | (x > width), OUT_OF_FRAME, labels).astype(np.uint8)
 
 
-def occlusion_from_mask(disparity_left: NDArray[np.float32], hidden: NDArray[np.bool_]) -> NDArray[np.uint8]:
+def occlusion_from_mask(
+    disparity_left: NDArray[np.float32], not_visible: NDArray[np.bool_]
+) -> NDArray[np.uint8]:
     """Labels of the left view from a mask that is True where the right one does not show the point.
 
     Such masks do not tell occluded from out of the frame; the disparity does.
     """
     outside = _position_in_other("left", disparity_left) < 0
-    return np.where(outside, OUT_OF_FRAME, np.where(hidden, OCCLUDED, VISIBLE)).astype(np.uint8)
+    return np.where(outside, OUT_OF_FRAME, np.where(not_visible, OCCLUDED, VISIBLE)).astype(np.uint8)
 
 
-def _position_in_other(eye: Eye, disparity: NDArray[np.float32]) -> NDArray[np.float64]:
-    sign = -1.0 if eye == "left" else 1.0
+def _position_in_other(view: View, disparity: NDArray[np.float32]) -> NDArray[np.float64]:
+    sign = -1.0 if view == "left" else 1.0
     return np.arange(disparity.shape[1]) + 0.5 + sign * disparity.astype(np.float64)

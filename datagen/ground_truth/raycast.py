@@ -13,7 +13,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import Eye
+from datagen.dataset.layout import View
 from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
 from datagen.ground_truth.scene_geometry import SceneGeometry
 
@@ -43,9 +43,9 @@ class SurfacePoints:
 
 
 class SceneRayCaster:
-    """Casts rays from either eye at the triangles of a scene.
+    """Casts rays from either camera at the triangles of a scene.
 
-    Meshes are built once; they stand in the left eye's frame, where 32 bits lose least.
+    Meshes are built once; they are kept in the left camera's frame, where 32-bit floats lose least.
     """
 
     def __init__(self, geometry: SceneGeometry) -> None:
@@ -53,7 +53,7 @@ class SceneRayCaster:
         self._scene = geometry.scene
         self._instant: float | None = None
 
-    def cast(self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Hits:
+    def cast(self, view: View, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Hits:
         """First hits through the centres of the pixels (rows, columns), both (N,).
 
         Embree finds the triangle in 32 bits; the distance to its plane is then computed in 64 bits.
@@ -63,13 +63,13 @@ class SceneRayCaster:
         labels = np.full(len(directions), VISIBLE, np.uint8)
         if len(self.geometry.triangles):
             self._place(time_frames)
-            own, other = self._eyes(eye)
+            own, other = self._camera_centres(view)
             disparity, index = self._first_hits(own, directions)
-            x_other = columns + 0.5 + (-disparity if eye == "left" else disparity)
+            x_other = columns + 0.5 + (-disparity if view == "left" else disparity)
             inside = (x_other >= 0) & (x_other <= self._scene.camera.width)
             labels[~inside] = OUT_OF_FRAME
-            hidden = self._hidden(own, other, directions[inside], disparity[inside])
-            labels[inside] = np.where(hidden, OCCLUDED, VISIBLE)
+            occluded = self._is_occluded(own, other, directions[inside], disparity[inside])
+            labels[inside] = np.where(occluded, OCCLUDED, VISIBLE)
         return Hits(disparity, index, labels)
 
     def coarse_pixels(self, across: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -79,24 +79,24 @@ class SceneRayCaster:
         grid = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
         return grid[0].ravel(), grid[1].ravel()
 
-    def cast_all(self, eye: Eye, time_frames: float) -> Hits:
+    def cast_all(self, view: View, time_frames: float) -> Hits:
         """First hits through the centres of all pixels, each field (H, W)."""
         shape = (self._scene.camera.height, self._scene.camera.width)
         rows, columns = np.indices(shape).reshape(2, -1)
-        hits = self.cast(eye, time_frames, rows, columns)
+        hits = self.cast(view, time_frames, rows, columns)
         return Hits(
             hits.disparity.reshape(shape), hits.object_index.reshape(shape), hits.occlusion.reshape(shape)
         )
 
     def surface_points(
-        self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
+        self, view: View, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
     ) -> SurfacePoints:
         """What is seen through the centres of the pixels (rows, columns), both (N,)."""
         directions = self.directions(rows, columns)
         triangle, weights = np.full(len(directions), -1, np.int64), np.zeros((len(directions), 3))
         if len(self.geometry.triangles):
             self._place(time_frames)
-            own, _ = self._eyes(eye)
+            own, _ = self._camera_centres(view)
             triangle = self._nearest(own, directions)
             met = triangle >= 0
             a, b, c = np.moveaxis(self._vertices[self.geometry.triangles[triangle[met]]] - own, 1, 0)
@@ -109,7 +109,7 @@ class SceneRayCaster:
     def sees_back(
         self, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """(N,) whether the left eye's pixels show a triangle from the side its corners run clockwise on."""
+        """(N,) whether the left view's pixels show a triangle from the side its corners run clockwise on."""
         points, directions = (
             self.surface_points("left", time_frames, rows, columns),
             self.directions(rows, columns),
@@ -126,10 +126,10 @@ class SceneRayCaster:
         y = -(rows + 0.5 - camera.height / 2) / camera.focal_px
         return np.stack([x, y, np.full_like(x, -1.0)], axis=-1)
 
-    def _eyes(self, eye: Eye) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where this eye and the other one are in the left eye's frame."""
+    def _camera_centres(self, view: View) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The centres of this view's camera and of the other one, in the left camera's frame."""
         left, right = np.zeros(3), np.array([self._scene.camera.baseline_m, 0.0, 0.0])
-        return (left, right) if eye == "left" else (right, left)
+        return (left, right) if view == "left" else (right, left)
 
     def _nearest(self, origin: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.int64]:
         """(N,) the triangle each ray meets first, -1 for none."""
@@ -161,15 +161,15 @@ class SceneRayCaster:
         distance = np.einsum("ij,ij->i", normals, corners[:, 0])
         return self._scene.camera.disparity_metres * normals / distance[:, None]
 
-    def _hidden(
+    def _is_occluded(
         self,
         own: NDArray[np.float64],
         other: NDArray[np.float64],
         directions: NDArray[np.float64],
         disparity: NDArray[np.float64],
     ) -> NDArray[np.bool_]:
-        """Whether something stands between the other eye and what is seen; the sky is in the same direction
-        from both eyes."""
+        """Whether something stands between the other camera and what is seen; the sky is in the same direction
+        from both cameras."""
         sky = disparity == 0
         depth = self._scene.camera.disparity_metres / np.where(sky, 1.0, disparity)
         towards = directions * depth[:, None]
@@ -194,8 +194,8 @@ class SceneRayCaster:
         """Put all triangles where they are at an instant."""
         if time_frames == self._instant:
             return
-        to_left_eye = np.linalg.inv(self._scene.camera.pose("left", time_frames))
-        self._vertices = self.geometry.vertices(time_frames, to_left_eye)
+        to_left_camera = np.linalg.inv(self._scene.camera.pose("left", time_frames))
+        self._vertices = self.geometry.vertices(time_frames, to_left_camera)
         self._embree = EmbreeScene(robust=True)
         TriangleMesh(self._embree, self._vertices.astype(np.float32), self.geometry.triangles)
         self._instant = time_frames

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import DIRECTIONS, Direction, Eye
+from datagen.dataset.layout import DIRECTIONS, Direction, View
 from datagen.ground_truth.raycast import SceneRayCaster
 from scenes import Scene
 
@@ -26,7 +26,7 @@ BOUNDARY_PIXELS = 10
 
 
 class PixelSurfaces:
-    """What some pixels of one eye see at one instant, ready to be followed to other instants.
+    """The surface points that some pixels of one view show at one instant, ready to be followed to other instants.
 
     The pixels are rows and columns of one shape S, which may be the whole image's or a list's; what the methods give
     has that shape too.
@@ -35,15 +35,15 @@ class PixelSurfaces:
     def __init__(
         self,
         caster: SceneRayCaster,
-        eye: Eye,
+        view: View,
         time_frames: float,
         rows: NDArray[np.intp],
         columns: NDArray[np.intp],
     ) -> None:
-        self._geometry, self._eye, self._time = caster.geometry, eye, time_frames
+        self._geometry, self._view, self._time = caster.geometry, view, time_frames
         self._shape = rows.shape
         rows, columns = rows.ravel(), columns.ravel()
-        points = caster.surface_points(eye, time_frames, rows, columns)
+        points = caster.surface_points(view, time_frames, rows, columns)
         self._met = points.triangle >= 0
         self._corners = self._geometry.triangles[points.triangle[self._met]]
         self._weights = points.weights[self._met]
@@ -52,7 +52,7 @@ class PixelSurfaces:
         """Directions through the pixels' centres in the camera's frame (x right, y up, looking along -z)."""
 
     def normals(self) -> NDArray[np.float32]:
-        """(*S, 3) unit normals of the triangles in the camera's frame, towards the eye; 0 for the sky."""
+        """(*S, 3) unit normals of the triangles in the camera's frame, towards the camera; 0 for the sky."""
         a, b, c = np.moveaxis(self._seen_from(self._time)[self._corners], 1, 0)
         normals = np.cross(b - a, c - a)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -67,7 +67,7 @@ class PixelSurfaces:
         """
         time = self._time + STEP[direction]
         camera = self._geometry.scene.camera
-        turn = camera.pose(self._eye, time)[:3, :3].T @ camera.pose(self._eye, self._time)[:3, :3]
+        turn = camera.pose(self._view, time)[:3, :3].T @ camera.pose(self._view, self._time)[:3, :3]
         there = self._rays @ turn.T
         there[self._met] = self._points_at(time)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -85,12 +85,12 @@ class PixelSurfaces:
         return self._picture(change, np.zeros(len(self._met)))
 
     def _seen_from(self, time_frames: float) -> NDArray[np.float64]:
-        """(V, 3) all vertices at an instant in this eye's frame of that instant."""
+        """(V, 3) all vertices at an instant in this view's camera frame of that instant."""
         camera = self._geometry.scene.camera
-        return self._geometry.vertices(time_frames, np.linalg.inv(camera.pose(self._eye, time_frames)))
+        return self._geometry.vertices(time_frames, np.linalg.inv(camera.pose(self._view, time_frames)))
 
     def _points_at(self, time_frames: float) -> NDArray[np.float64]:
-        """(M, 3) where the surface points are at an instant, in this eye's frame of that instant."""
+        """(M, 3) where the surface points are at an instant, in this view's camera frame of that instant."""
         corners = self._seen_from(time_frames)[self._corners]
         return np.einsum("ij,ijk->ik", self._weights, corners)
 
@@ -130,16 +130,16 @@ class ExtraTargets:
         self._caster, self._kinds = caster, kinds
 
     def make(
-        self, eye: Eye, frame: int, object_index: NDArray[np.integer[Any]]
+        self, view: View, frame: int, object_index: NDArray[np.integer[Any]]
     ) -> dict[tuple[str, Direction | None], NDArray[Any]]:
-        """The arrays of one eye and frame, by kind and direction. object_index: (H, W), the frame's."""
+        """The arrays of one view and frame, by kind and direction. object_index: (H, W), the frame's."""
         made: dict[tuple[str, Direction | None], NDArray[Any]] = {}
         if "material_index" in self._kinds:
             made["material_index", None] = material_index(self._caster.geometry.scene, object_index)
         if set(self._kinds) <= {"material_index"}:
             return made
         pixels = np.indices(object_index.shape)
-        surfaces = PixelSurfaces(self._caster, eye, frame, pixels[0], pixels[1])
+        surfaces = PixelSurfaces(self._caster, view, frame, pixels[0], pixels[1])
         if "normals" in self._kinds:
             made["normals", None] = surfaces.normals()
         for direction in DIRECTIONS:

@@ -25,7 +25,7 @@ RAYS_ACROSS = 48
 
 @dataclass(frozen=True)
 class Curation:
-    """When a frame is degenerate. Shares are of the left eye's pixels, 0..1."""
+    """When a frame is degenerate. Shares are of the left view's pixels, 0..1."""
 
     enabled: bool = True
     """Whether anything is rejected."""
@@ -36,7 +36,7 @@ class Curation:
     max_one_object: float = 0.9
     """One object, or the sky, filling more than this leaves nothing to learn."""
     max_hidden: float = 0.7
-    """Share that the other eye cannot see."""
+    """Share that is not visible in the right view: occluded or out of frame."""
     min_textured: float = 0.05
     """Share with texture around it, of the rendered picture."""
     disparity_px: tuple[float, float] | None = None
@@ -93,6 +93,6 @@ def _faults(caster: SceneRayCaster, curation: Curation, frame: int) -> Iterator[
     if counts.max() > curation.max_one_object:
         yield "one surface fills the view"
     if (hits.occlusion != VISIBLE).mean() > curation.max_hidden:
-        yield "mostly hidden from the other eye"
+        yield "mostly occluded or out of frame"
     if share_outside(hits.disparity[hits.object_index > 0], curation) > curation.max_outside:
         yield "disparity out of range"

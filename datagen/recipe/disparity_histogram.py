@@ -1,7 +1,7 @@
 """Meeting a histogram of disparities: each scene's depths and baseline drawn such that the set as a whole has it.
 
 What one scene shows is spread about its median in a way of its own, and the baseline puts that median wherever it is
-wanted without changing what the left eye sees. So a set's histogram is a mixture of the family's spread at different
+wanted without changing the left view. So a set's histogram is a mixture of the family's spread at different
 medians; families that place things by disparity have several spreads, narrow and wide. A few scenes that belong to no
 split show those spreads once, when the recipe is made; the shares of the mixture nearest to the histogram are written
 into the recipe, and every scene takes its turn by its number.
@@ -21,9 +21,9 @@ from datagen.errors import DatasetError
 from datagen.recipe.disparity_range import surface_disparities
 from scenes import FAMILIES, FamilyConfig, sample_scene
 
-PILOT_KEY = 3
-"""First number of the pilot scenes' random streams, beside those of the three splits."""
-PILOT_SCENES = 16
+PREFLIGHT_KEY = 3
+"""First number of the preflight scenes' random streams, beside those of the three splits."""
+PREFLIGHT_SCENES = 16
 """Of each spread."""
 NARROW_RANGES = (4.0, 20.0)
 """Ratios of greatest and least disparity that families which place things by disparity try besides their own."""
@@ -118,10 +118,10 @@ def fitted(wanted: DisparityHistogram, world: FamilyConfig, seed: int) -> Dispar
 
 
 def _spread(world: FamilyConfig, family: str, seed: int) -> NDArray[np.float64]:
-    """Disparities of the pilot scenes' surfaces over their scene's median, sorted, each scene counting alike."""
+    """Disparities of the preflight scenes' surfaces over their scene's median, sorted, each scene counting alike."""
     pooled = []
-    for number in range(PILOT_SCENES):
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PILOT_KEY, number)))
+    for number in range(PREFLIGHT_SCENES):
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PREFLIGHT_KEY, number)))
         disparity = surface_disparities(sample_scene(rng, family, world))
         if len(disparity):
             quantiles = np.quantile(disparity, np.linspace(0.0005, 0.9995, 1000))

@@ -1,6 +1,6 @@
 """Meeting disparities asked for where the depths of a world are what they are: by choosing the baseline.
 
-Streets and landscapes reach from the camera's feet to the horizon. What the left eye sees does not depend on the
+Streets and landscapes reach from the camera's feet to the horizon. The left view does not depend on the
 baseline, and every disparity is proportional to it, so one look decides it exactly.
 """
 
@@ -22,7 +22,7 @@ REACHED_PERCENT = 99.5
 
 
 def surface_disparities(scene: Scene) -> NDArray[np.float64]:
-    """(P,) px, of what a coarse grid of the left eye's pixels shows in the first and last frame, but the sky."""
+    """(P,) px, of what a coarse grid of the left view's pixels shows in the first and last frame, but the sky."""
     caster = SceneRayCaster(SceneGeometry(scene))
     rows, columns = caster.coarse_pixels(RAYS_ACROSS)
     seen = [caster.cast("left", frame, rows, columns) for frame in sorted({0, scene.frames - 1})]

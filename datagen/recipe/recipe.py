@@ -46,7 +46,7 @@ class Recipe:
     """Jumps above this are discontinuities, masked out of the gradient targets."""
 
     assets: AssetPool = field(default_factory=AssetPool)
-    """The user's own files; each belongs to one split only."""
+    """The user assets; each belongs to one split only."""
     curriculum_scenes: int = 0
     """Over so many scenes of the train split the worlds grow from few and simple to the family's own; 0 for none. What
     is validated and tested on is the family's own from the first scene."""
@@ -94,7 +94,7 @@ class Recipe:
             raise DatasetError(f"the seed must not be negative, got {self.seed}")
 
     def _check_size(self) -> None:
-        """Raise DatasetError for images that no reader would take, and disparities that no eye would see."""
+        """Raise DatasetError for images that no reader would take, and disparities that no image could show."""
         width, height = self.world.width, self.world.height
         if 3 * width * height > MAX_ELEMENTS:
             raise DatasetError(

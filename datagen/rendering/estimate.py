@@ -83,4 +83,4 @@ def _sizes(manifest: SceneManifest) -> tuple[int, int]:
 
 
 def _sum(sizes: Iterable[tuple[str, int]], per_frame: bool) -> int:
-    return sum(size for kind, size in sizes if (kind in KINDS and KINDS[kind].per_eye) == per_frame)
+    return sum(size for kind, size in sizes if (kind in KINDS and KINDS[kind].per_view) == per_frame)

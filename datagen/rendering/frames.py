@@ -1,4 +1,4 @@
-"""A Scene to arrays: both eyes' pictures and exact ground truth, frame by frame."""
+"""A Scene to arrays: both views' pictures and exact ground truth, frame by frame."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import EYES, Direction, Eye
+from datagen.dataset.layout import VIEWS, Direction, View
 from datagen.ground_truth.labels import forward_differences, gradient_validity
 from datagen.ground_truth.raycast import Hits, SceneRayCaster
 from datagen.ground_truth.scene_geometry import SceneGeometry
@@ -28,8 +28,8 @@ LOG_LINES_SHOWN = 5
 
 
 @dataclass(frozen=True)
-class EyeTargets:
-    """One eye's pictures and ground truth, as they are stored."""
+class ViewTargets:
+    """One view's pictures and ground truth, as they are stored."""
 
     images: dict[str, NDArray[np.uint8]]
     """(H, W, 3) sRGB of each pass, by its name."""
@@ -88,8 +88,8 @@ def render_frames(
     options: RenderOptions | None = None,
     watch: Stopwatch | None = None,
     caster: SceneRayCaster | None = None,
-) -> Generator[tuple[int, dict[Eye, EyeTargets]], None, None]:
-    """Yield (frame, both eyes' arrays) for every frame of a scene, frames counted from 0.
+) -> Generator[tuple[int, dict[View, ViewTargets]], None, None]:
+    """Yield (frame, both views' arrays) for every frame of a scene, frames counted from 0.
 
     scratch: an existing folder for Blender's temporary files and, outside worker processes, its log.
     caster: at the scene's meshes, if they have been built already. Blender keeps one world a process, so one
@@ -113,22 +113,22 @@ def render_frames(
         extra_targets = ExtraTargets(caster, options.targets)
         for frame in range(scene.frames):
             with watch.step("render"), quiet(log):
-                views = {eye: render_view(world, eye, frame, scratch) for eye in EYES}
+                radiances = {view: render_view(world, view, frame, scratch) for view in VIEWS}
             if exposure is None:  # One exposure a scene: a camera does not flicker.
-                exposure = automatic_exposure(views["left"], scene.exposure_key)
-            images = {eye: {"clean": develop(radiance, exposure)} for eye, radiance in views.items()}
+                exposure = automatic_exposure(radiances["left"], scene.exposure_key)
+            images = {view: {"clean": develop(radiance, exposure)} for view, radiance in radiances.items()}
             if "final" in options.passes:
                 with watch.step("render_final"), quiet(log):
-                    for eye, radiance in render_final(world, frame, exposure, scratch).items():
-                        light = sensor.expose(radiance, exposure, eye, frame)
-                        images[eye]["final"] = develop(light, 1.0)
+                    for view, radiance in render_final(world, frame, exposure, scratch).items():
+                        light = sensor.expose(radiance, exposure, view, frame)
+                        images[view]["final"] = develop(light, 1.0)
             with watch.step("ground_truth"):
                 targets = {}
-                for eye in EYES:
-                    hits = caster.cast_all(eye, frame)
-                    chosen = {name: images[eye][name] for name in options.passes}
-                    extra = extra_targets.make(eye, frame, hits.object_index)
-                    targets[eye] = _targets(chosen, hits, options.gradient_threshold_px, extra)
+                for view in VIEWS:
+                    hits = caster.cast_all(view, frame)
+                    chosen = {name: images[view][name] for name in options.passes}
+                    extra = extra_targets.make(view, frame, hits.object_index)
+                    targets[view] = _targets(chosen, hits, options.gradient_threshold_px, extra)
             yield frame, targets
     except RuntimeError as error:
         tail = " | ".join(log.read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:])
@@ -140,10 +140,10 @@ def _targets(
     hits: Hits,
     gradient_threshold_px: float,
     extra: dict[tuple[str, Direction | None], NDArray[Any]],
-) -> EyeTargets:
+) -> ViewTargets:
     disparity = hits.disparity.astype(np.float32)
     gradient = forward_differences(disparity)
-    return EyeTargets(
+    return ViewTargets(
         images,
         disparity,
         gradient,

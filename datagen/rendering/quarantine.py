@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from datagen.dataset.layout import SPLITS, Layout
+from datagen.dataset.layout import SPLITS, Layout, SceneKey
 from datagen.errors import DatasetError
 from datagen.executors import Failure
 from datagen.recipe.recipe import Recipe
@@ -73,7 +73,7 @@ def release(tree: Tree, split: str, scene: int) -> None:
     tree.remove(log_name(split, scene))
 
 
-def quarantined_scenes(tree: Tree) -> list[tuple[str, int]]:
+def quarantined_scenes(tree: Tree) -> list[SceneKey]:
     """(split, scene) of every scene in quarantine, in order."""
     found = []
     for split in SPLITS:

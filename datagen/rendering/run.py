@@ -9,7 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from datagen.dataset.layout import SPLITS, Layout, scene_numbers
+from datagen.dataset.layout import SPLITS, Layout, SceneKey, scene_numbers
 from datagen.dataset.manifest import SceneManifest
 from datagen.errors import DatasetError, DiskFullError
 from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
@@ -35,9 +35,6 @@ MEMORY_SHARE = 0.8
 NO_ROOM_BYTES = 16 << 20
 """A failure with less room than this is the disk's: Blender does not say so itself."""
 
-Scene = tuple[str, int]
-"""(split, number)."""
-
 
 @dataclass(frozen=True)
 class RenderSummary:
@@ -59,7 +56,7 @@ def render_dataset(
     device: str = "cpu",
     shard: tuple[int, int] = (0, 1),
     executor: Executor | None = None,
-    only: Collection[Scene] | None = None,
+    only: Collection[SceneKey] | None = None,
     on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
 ) -> RenderSummary:
     """Render what is missing of a recipe under `root`; running it again finishes or extends the data set.
@@ -140,12 +137,12 @@ class _Run:
     area: StagingArea
     recipe: Recipe
     log: RunLog
-    quarantined: set[Scene]
+    quarantined: set[SceneKey]
     total: int
     on_scene: Callable[[int, int, SceneManifest | None], None] | None
     rendered: int = 0
     bytes_written: int = 0
-    in_flight: set[Scene] = field(default_factory=set)
+    in_flight: set[SceneKey] = field(default_factory=set)
 
     def go(self, executor: Executor, jobs: list[SceneJob]) -> None:
         settings = self.recipe.settings_sha256()
@@ -191,7 +188,7 @@ class _Run:
         put_in_quarantine(self.tree, self.area.folder, self.recipe, *scene, failure, outcome.attempts)
         self.quarantined.add(scene)
 
-    def _take_scene(self, scene: Scene, manifest: SceneManifest, attempts: int) -> None:
+    def _take_scene(self, scene: SceneKey, manifest: SceneManifest, attempts: int) -> None:
         size = sum(entry.size for entry in manifest.files)
         self.rendered += 1
         self.bytes_written += size
@@ -214,7 +211,7 @@ class _Run:
 
 
 def _check_possible(
-    recipe: Recipe, device: str, executor: Executor, tree: Tree, wanted: Sequence[tuple[str, int]]
+    recipe: Recipe, device: str, executor: Executor, tree: Tree, wanted: Sequence[SceneKey]
 ) -> None:
     """Raise DatasetError for what no scene would be rendered with, instead of putting all of them in quarantine."""
     asks = device != "cpu" or recipe.curation.disparity_px is not None
@@ -237,18 +234,18 @@ def _merge(tree: Tree, recipe: Recipe) -> Recipe:
 
 
 def _check_store(tree: Tree, recipe: Recipe) -> None:
-    """Raise DatasetError unless the user's files that a recipe names are in the data set's own store."""
+    """Raise DatasetError unless the user assets that a recipe names are in the data set's store."""
     pool = recipe.assets
     if not pool:
         return
     if not isinstance(tree, LocalTree):
-        raise DatasetError(f"{tree.name}: a recipe with files of your own needs a folder, not a URL")
+        raise DatasetError(f"{tree.name}: a recipe with user assets needs a folder, not a URL")
     store = Layout(tree.root).assets
     for asset in (*pool.meshes, *pool.textures, *pool.environments):
         if not (store / f"{asset.sha256}.npz").is_file():
             raise DatasetError(
                 f"{tree.name} has no prepared file of {asset.name}, which the recipe names: give the folders of "
-                "your own files again"
+                "your meshes, textures and environments again"
             )
 
 
@@ -260,7 +257,7 @@ def _write_recipe(tree: Tree, area: StagingArea, recipe: Recipe) -> None:
         tree.adopt(staged, staged.name)
 
 
-def committed_scenes(tree: Tree) -> set[Scene]:
+def committed_scenes(tree: Tree) -> set[SceneKey]:
     """Every scene that is whole."""
     folders = {split: Layout(Path()).manifest(split, 0).parent.as_posix() for split in SPLITS}
     return {
@@ -268,7 +265,7 @@ def committed_scenes(tree: Tree) -> set[Scene]:
     }
 
 
-def _wanted(recipe: Recipe, shard: tuple[int, int]) -> Iterator[Scene]:
+def _wanted(recipe: Recipe, shard: tuple[int, int]) -> Iterator[SceneKey]:
     index, count = shard
     if not 0 <= index < count:
         raise DatasetError(f"shard {index}/{count} does not exist: it takes 0 <= I < N")

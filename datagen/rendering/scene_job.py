@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from datagen.dataset.layout import FIRST_FRAME, RENDER_PASSES, Direction, Eye, Layout
+from datagen.dataset.layout import FIRST_FRAME, RENDER_PASSES, Direction, Layout, View
 from datagen.dataset.manifest import SceneManifest, file_entry, write_manifest
 from datagen.errors import DatasetError
 from datagen.formats import (
@@ -30,7 +30,7 @@ from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.scene_geometry import SceneGeometry
 from datagen.recipe.curation import TEXTURELESS, fault_before_rendering, is_textureless
 from datagen.recipe.recipe import Recipe
-from datagen.rendering.frames import BLENDER_LOG, EyeTargets, RenderOptions, Stopwatch, render_frames
+from datagen.rendering.frames import BLENDER_LOG, RenderOptions, Stopwatch, ViewTargets, render_frames
 from datagen.rendering.staging import StagingArea
 from scenes import Scene, scene_to_json
 from scenes.user_assets.pool import UserEnvironment, UserMesh, UserTexture, use_store
@@ -104,8 +104,8 @@ def _render_attempt(
             if frame == 0 and is_textureless(next(iter(targets["left"].images.values())), recipe.curation):
                 return None
             with watch.step("write"):
-                for eye, arrays in targets.items():
-                    _write_eye(staged, job, eye, FIRST_FRAME + frame, arrays)
+                for view, arrays in targets.items():
+                    _write_view(staged, job, view, FIRST_FRAME + frame, arrays)
                 statistics.append(_frame_statistics(targets["left"]))
     with watch.step("write"):
         _write_scene_files(staged, job, scene)
@@ -122,9 +122,9 @@ _EXTRA_WRITERS: dict[str, Callable[[Path, Any], None]] = {
 }
 
 
-def _write_eye(layout: Layout, job: SceneJob, eye: Eye, number: int, arrays: EyeTargets) -> None:
+def _write_view(layout: Layout, job: SceneJob, view: View, number: int, arrays: ViewTargets) -> None:
     def path(kind: str, direction: Direction | None = None) -> Path:
-        return layout.file(kind, job.split, job.scene, eye, number, direction)
+        return layout.file(kind, job.split, job.scene, view, number, direction)
 
     for name, image in arrays.images.items():
         write_png(path(RENDER_PASSES[name]), image)
@@ -145,7 +145,7 @@ def _write_scene_files(layout: Layout, job: SceneJob, scene: Scene) -> None:
     write_text(layout.scene_record(job.split, job.scene), scene_to_json(scene))
 
 
-def _frame_statistics(left: EyeTargets) -> dict[str, float]:
+def _frame_statistics(left: ViewTargets) -> dict[str, float]:
     low, middle, high = np.percentile(left.disparity, (1, 50, 99))
     return {
         "disparity_p01_px": float(low),
@@ -160,19 +160,19 @@ def _frame_statistics(left: EyeTargets) -> dict[str, float]:
 
 
 def _scene_statistics(scene: Scene, frames: list[dict[str, float]], rejected: Counter[str]) -> dict[str, Any]:
-    """Counts, the means over the frames of what was measured in the left eye, and what was rejected why."""
+    """Counts, the means over the frames of what was measured in the left view, and what was rejected why."""
     means = {key: round(float(np.mean([frame[key] for frame in frames])), 5) for key in frames[0]}
     return {"objects": len(scene.objects), "frames": scene.frames, **means, "rejected": dict(rejected)}
 
 
 def _assets_used(recipe: Recipe, scene: Scene) -> list[str]:
-    """The names of the user's own files in a scene."""
-    own = (
+    """The names of the user assets in a scene."""
+    candidates = (
         *(thing.shape for thing in scene.objects),
         *(material.color for material in scene.materials),
         scene.world.environment,
     )
-    used = {item.sha256 for item in own if isinstance(item, UserMesh | UserTexture | UserEnvironment)}
+    used = {item.sha256 for item in candidates if isinstance(item, UserMesh | UserTexture | UserEnvironment)}
     pool = recipe.assets
     return sorted(a.name for a in (*pool.meshes, *pool.textures, *pool.environments) if a.sha256 in used)
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from datagen.dataset.layout import SPLITS, Layout
+from datagen.dataset.layout import SPLITS, Layout, SceneKey
 from stereoforge_kit.files import (
     LocalTree,
     TemporaryFolders,
@@ -102,7 +102,7 @@ def _clear(tree: Tree, area: Path) -> None:
         remove_folder(area)
 
 
-def _unfinished_scenes(area: Path) -> set[tuple[str, int]]:
+def _unfinished_scenes(area: Path) -> set[SceneKey]:
     """(split, scene) of every scene that was being made in an area."""
     found = set()
     for path in area.iterdir():

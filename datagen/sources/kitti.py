@@ -57,10 +57,13 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
 
 
 def read_labels(all_points: Path, visible_points: Path) -> NDArray[np.uint8]:
-    """Points missing from the second file are hidden in the right view. Raises FormatError."""
+    """(H, W) occlusion labels: points that only the first file has are not visible in the right view.
+
+    Raises FormatError.
+    """
     disparity = read_disparity(all_points)
-    hidden = np.isnan(read_disparity(visible_points)) & ~np.isnan(disparity)
-    return occlusion_from_mask(disparity, hidden)
+    not_visible = np.isnan(read_disparity(visible_points)) & ~np.isnan(disparity)
+    return occlusion_from_mask(disparity, not_visible)
 
 
 def read_objects(path: Path) -> NDArray[np.uint16]:

@@ -38,8 +38,8 @@ def read_labels(truth: Path, mask: Path) -> NDArray[np.uint8]:
     """Labels from `mask0nocc.png`. Raises FormatError."""
     disparity = read_disparity(truth)
     shown = read_png(mask)
-    hidden = ((shown if shown.ndim == 2 else shown[..., 0]) != _SHOWN_BY_BOTH) & ~np.isnan(disparity)
-    return occlusion_from_mask(disparity, hidden)
+    not_visible = ((shown if shown.ndim == 2 else shown[..., 0]) != _SHOWN_BY_BOTH) & ~np.isnan(disparity)
+    return occlusion_from_mask(disparity, not_visible)
 
 
 def scene_frame(name: str, images: Path, truths: Path) -> FileFrame | None:

@@ -35,8 +35,8 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
 
 def read_labels(occlusion: Path, out_of_frame: Path) -> NDArray[np.uint8]:
     """Join the two masks into our labels. Raises FormatError."""
-    hidden, outside = (_mask(read_png(path)) for path in (occlusion, out_of_frame))
-    return np.where(outside, OUT_OF_FRAME, np.where(hidden, OCCLUDED, VISIBLE)).astype(np.uint8)
+    occluded, outside = (_mask(read_png(path)) for path in (occlusion, out_of_frame))
+    return np.where(outside, OUT_OF_FRAME, np.where(occluded, OCCLUDED, VISIBLE)).astype(np.uint8)
 
 
 def _mask(image: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.bool_]:

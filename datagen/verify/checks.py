@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from datagen.dataset.layout import Eye
+from datagen.dataset.layout import View
 from datagen.ground_truth.labels import (
     OCCLUDED,
     OUT_OF_FRAME,
@@ -80,17 +80,17 @@ def check_object_index(
 
 
 def check_views(
-    eye: Eye,
+    view: View,
     disparity: NDArray[np.float32],
     other_disparity: NDArray[np.float32],
     occlusion: NDArray[np.uint8],
 ) -> Iterator[str]:
-    """The two views' disparities and the labels agree, seen from `eye`.
+    """The two views' disparities and the labels agree, seen from `view`.
 
     A visible point has in the other view a disparity between those of the two pixels it falls between; an
     occluded one falls on or beside something nearer; one is out of the frame if its x says so.
     """
-    x, low, high = _in_other_view(eye, disparity, other_disparity)
+    x, low, high = _in_other_view(view, disparity, other_disparity)
     width = disparity.shape[1]
     outside = (x < 0) | (x > width)
     tie = np.minimum(np.abs(x), np.abs(x - width)) < FRAME_TIE_PX
@@ -105,7 +105,7 @@ def check_views(
         "visible pixels have another disparity than the other view has there",
     )
     # What hides a point may be thinner than a pixel and miss the centres next to it: look one pixel further.
-    _, _, nearest = _in_other_view(eye, disparity, maximum_filter(other_disparity, size=3))
+    _, _, nearest = _in_other_view(view, disparity, maximum_filter(other_disparity, size=3))
     yield from _too_many(
         (nearest <= disparity + NEARER_PX)[occlusion == OCCLUDED],
         MAX_INCONSISTENT,
@@ -180,12 +180,12 @@ def check_derived(values: NDArray[Any], expected: NDArray[Any], origin: str) -> 
 
 
 def _in_other_view(
-    eye: Eye, disparity: NDArray[np.float32], other_disparity: NDArray[np.float32]
+    view: View, disparity: NDArray[np.float32], other_disparity: NDArray[np.float32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]:
     """Where each pixel's point lies in the other view: its x there, and the least and the greatest disparity
     of the two pixels whose centres it lies between."""
     width = disparity.shape[1]
-    sign = -1.0 if eye == "left" else 1.0
+    sign = -1.0 if view == "left" else 1.0
     x = np.arange(width) + 0.5 + sign * disparity.astype(np.float64)
     first = np.floor(np.clip(x - 0.5, -1, width)).astype(np.int64)
     rows = np.arange(len(disparity))[:, None]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import DIRECTIONS, EYES, FIRST_FRAME, RENDER_PASSES, Direction, Eye
+from datagen.dataset.layout import DIRECTIONS, FIRST_FRAME, RENDER_PASSES, VIEWS, Direction, View
 from datagen.dataset.samples import StereoSample
 from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.targets import PixelSurfaces, material_index, motion_boundaries
@@ -52,86 +52,86 @@ class FrameCheck:
             yield left, f"is {sample.size} where the scene's camera makes {size}"
             return
         unusable = [
-            (self._file("disparity", eye), message)
-            for eye in EYES
-            for message in check_disparity(sample.view(eye).disparity)
+            (self._file("disparity", view), message)
+            for view in VIEWS
+            for message in check_disparity(sample.view(view).disparity)
         ]
         if unusable:  # Whatever else is wrong then follows from that.
             yield from unusable
             return
-        for eye in EYES:
-            for message in self._check_view(eye):
-                yield self._file("disparity", eye), message
-            yield from self._check_extra_targets(eye)
+        for view in VIEWS:
+            for message in self._check_view(view):
+                yield self._file("disparity", view), message
+            yield from self._check_extra_targets(view)
         for sample in self.samples:
             messages = check_images(sample.left, sample.right, sample.disparity_left, sample.occlusion_left)
             for message in messages:
                 yield self._file(RENDER_PASSES[sample.render_pass], "right"), message
 
-    def _file(self, kind: str, eye: Eye, direction: Direction | None = None) -> Path:
+    def _file(self, kind: str, view: View, direction: Direction | None = None) -> Path:
         sample = self.samples[0]
-        return sample.layout.file(kind, sample.split, sample.scene, eye, sample.frame, direction)
+        return sample.layout.file(kind, sample.split, sample.scene, view, sample.frame, direction)
 
-    def _check_view(self, eye: Eye) -> Iterator[str]:
+    def _check_view(self, view: View) -> Iterator[str]:
         sample = self.samples[0]
-        view, other = sample.view(eye), sample.view("right" if eye == "left" else "left")
+        arrays, other = sample.view(view), sample.view("right" if view == "left" else "left")
         threshold_px = self.recipe.gradient_threshold_px
-        yield from check_gradient(view.disparity, view.gradient, view.gradient_valid, threshold_px)
-        yield from check_object_index(view.object_index, view.disparity, len(self.scene.objects))
-        yield from check_views(eye, view.disparity, other.disparity, view.occlusion)
+        yield from check_gradient(arrays.disparity, arrays.gradient, arrays.gradient_valid, threshold_px)
+        yield from check_object_index(arrays.object_index, arrays.disparity, len(self.scene.objects))
+        yield from check_views(view, arrays.disparity, other.disparity, arrays.occlusion)
         if self.caster is None:
             return
-        rows, columns = self._sampled(eye)
+        rows, columns = self._sampled(view)
         yield from check_geometry(
-            view.disparity[rows, columns],
-            view.object_index[rows, columns],
-            view.occlusion[rows, columns],
-            self.caster.cast(eye, sample.frame - FIRST_FRAME, rows, columns),
+            arrays.disparity[rows, columns],
+            arrays.object_index[rows, columns],
+            arrays.occlusion[rows, columns],
+            self.caster.cast(view, sample.frame - FIRST_FRAME, rows, columns),
         )
 
-    def _sampled(self, eye: Eye) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _sampled(self, view: View) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Rows and columns of the pixels that are compared with the geometry."""
         sample = self.samples[0]
-        rng = np.random.default_rng((sample.scene, sample.frame, EYES.index(eye)))
+        rng = np.random.default_rng((sample.scene, sample.frame, VIEWS.index(view)))
         pixels = rng.integers(0, sample.size[0] * sample.size[1], self.sampled_pixels)
         rows, columns = np.unravel_index(pixels, sample.size)
         return rows, columns
 
-    def _check_extra_targets(self, eye: Eye) -> Iterator[tuple[Path, str]]:
+    def _check_extra_targets(self, view: View) -> Iterator[tuple[Path, str]]:
         """The targets that the recipe asks for besides the basic ones."""
         sample, kinds = self.samples[0], self.recipe.targets
         if not kinds or self.caster is None:
             return
-        rows, columns = self._sampled(eye)
+        rows, columns = self._sampled(view)
         instant = sample.frame - FIRST_FRAME
-        surfaces = PixelSurfaces(self.caster, eye, instant, rows, columns)
+        surfaces = PixelSurfaces(self.caster, view, instant, rows, columns)
         if "material_index" in kinds:
-            worn = material_index(self.scene, sample.view(eye).object_index)
-            for message in check_derived(sample.material_index(eye), worn, "the objects' materials"):
-                yield self._file("material_index", eye), message
+            worn = material_index(self.scene, sample.view(view).object_index)
+            for message in check_derived(sample.material_index(view), worn, "the objects' materials"):
+                yield self._file("material_index", view), message
         if "normals" in kinds:
             for message in check_vectors(
-                sample.normals(eye)[rows, columns], surfaces.normals(), NORMAL_TOLERANCE
+                sample.normals(view)[rows, columns], surfaces.normals(), NORMAL_TOLERANCE
             ):
-                yield self._file("normals", eye), message
+                yield self._file("normals", view), message
         for direction in DIRECTIONS:
-            yield from self._check_motion(eye, direction, surfaces)
+            yield from self._check_motion(view, direction, surfaces)
 
     def _check_motion(
-        self, eye: Eye, direction: Direction, surfaces: PixelSurfaces
+        self, view: View, direction: Direction, surfaces: PixelSurfaces
     ) -> Iterator[tuple[Path, str]]:
         sample, kinds = self.samples[0], self.recipe.targets
-        rows, columns = self._sampled(eye)
-        flow = sample.flow(eye, direction) if "optical_flow" in kinds else None
+        rows, columns = self._sampled(view)
+        flow = sample.flow(view, direction) if "optical_flow" in kinds else None
         if flow is not None:
             for message in check_vectors(flow[rows, columns], surfaces.flow(direction), MOTION_TOLERANCE_PX):
-                yield self._file("optical_flow", eye, direction), message
+                yield self._file("optical_flow", view, direction), message
         if "disparity_change" in kinds:
-            change = sample.disparity_change(eye, direction)[rows, columns]
+            change = sample.disparity_change(view, direction)[rows, columns]
             for message in check_vectors(change, surfaces.disparity_change(direction), MOTION_TOLERANCE_PX):
-                yield self._file("disparity_change", eye, direction), message
+                yield self._file("disparity_change", view, direction), message
         if "motion_boundaries" in kinds and flow is not None:
-            marked = sample.motion_boundaries(eye, direction)
-            expected = motion_boundaries(flow, sample.view(eye).object_index)
+            marked = sample.motion_boundaries(view, direction)
+            expected = motion_boundaries(flow, sample.view(view).object_index)
             for message in check_derived(marked, expected, "optical flow and object index"):
-                yield self._file("motion_boundaries", eye, direction), message
+                yield self._file("motion_boundaries", view, direction), message

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from datagen.dataset.layout import SPLITS, Layout
+from datagen.dataset.layout import SPLITS, Layout, SceneKey
 from datagen.dataset.manifest import SceneManifest
 from datagen.dataset.samples import open_layout
 from datagen.executors import Executor
@@ -16,7 +16,7 @@ from datagen.rendering.staging import discard_uncommitted
 from datagen.verify.report import Problem
 
 
-def broken_scenes(problems: Iterable[Problem]) -> list[tuple[str, int]]:
+def broken_scenes(problems: Iterable[Problem]) -> list[SceneKey]:
     """(split, scene) of every finished scene that a problem lies in, in order."""
     found = {
         (item.split, item.scene) for item in problems if item.split is not None and item.scene is not None
@@ -24,7 +24,7 @@ def broken_scenes(problems: Iterable[Problem]) -> list[tuple[str, int]]:
     return sorted(found, key=lambda scene: (SPLITS.index(scene[0]), scene[1]))
 
 
-def problems_left(problems: Iterable[Problem], repaired: list[tuple[str, int]]) -> list[Problem]:
+def problems_left(problems: Iterable[Problem], repaired: list[SceneKey]) -> list[Problem]:
     """Those that lie in no finished scene, without the files that a repaired scene has replaced or taken in."""
     paths = [PurePosixPath(path) for scene in repaired for path in Layout(Path()).scene_paths(*scene)]
     return [
@@ -37,7 +37,7 @@ def problems_left(problems: Iterable[Problem], repaired: list[tuple[str, int]]) 
 
 def repair_dataset(
     root: Path | str,
-    broken: list[tuple[str, int]],
+    broken: list[SceneKey],
     *,
     executor: Executor | None = None,
     on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,

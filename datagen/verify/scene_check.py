@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from datagen.dataset.integrity import compare
-from datagen.dataset.layout import EYES, FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, Layout
+from datagen.dataset.layout import FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, VIEWS, Layout
 from datagen.dataset.manifest import FileEntry, SceneManifest, read_manifest
 from datagen.dataset.samples import StereoSample, read_scene
 from datagen.errors import DatasetError
@@ -111,11 +111,11 @@ class SceneCheck:
 
     def _frame_files(self, frame: int) -> list[Path]:
         kinds = [RENDER_PASSES[name] for name in self.recipe.passes]
-        kinds += [kind for kind in (*TARGETS, *self.recipe.targets) if KINDS[kind].per_eye]
+        kinds += [kind for kind in (*TARGETS, *self.recipe.targets) if KINDS[kind].per_view]
         return [
-            self.layout.file(kind, self.split, self.scene, eye, frame, direction)
+            self.layout.file(kind, self.split, self.scene, view, frame, direction)
             for kind in kinds
-            for eye in EYES
+            for view in VIEWS
             for direction in KINDS[kind].directions
         ]
 
@@ -139,7 +139,7 @@ class SceneCheck:
             self._failed(error)
             return
         camera = scene.camera
-        expected = {FIRST_FRAME + k: [camera.pose(eye, k) for eye in EYES] for k in range(scene.frames)}
+        expected = {FIRST_FRAME + k: [camera.pose(view, k) for view in VIEWS] for k in range(scene.frames)}
         if poses.keys() != expected.keys():
             self._found(path, f"has the frames {sorted(poses)} where the scene has {sorted(expected)}")
             return

@@ -44,12 +44,12 @@ def test_one_surface_and_an_empty_view_are_found() -> None:
     assert fault(plates(192, 108, Plate((0.0, 0.0), -5.0, (1.0, 1.0)))) == "one surface fills the view"
 
 
-def test_what_the_other_eye_hardly_sees_is_found() -> None:
-    # 1 m before eyes 1 m apart: the disparity is the whole image width.
+def test_what_is_hardly_visible_in_the_other_view_is_found() -> None:
+    # 1 m before views 1 m apart: the disparity is the whole image width.
     near = Plate((0.0, 0.0), 1.01, (0.4, 9.0))
     assert (
         fault(plates(192, 108, near, WALL), Curation(max_one_object=0.95))
-        == "mostly hidden from the other eye"
+        == "mostly occluded or out of frame"
     )
 
 

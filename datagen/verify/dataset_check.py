@@ -8,8 +8,8 @@ from contextlib import closing, contextmanager
 from itertools import islice
 from pathlib import Path
 
-from datagen.dataset.layout import KINDS, SPLITS, Layout
-from datagen.dataset.remote_cache import MirroredLayout, open_mirror
+from datagen.dataset.layout import KINDS, SPLITS, Layout, SceneKey
+from datagen.dataset.remote_cache import RemoteLayout, open_remote
 from datagen.dataset.samples import open_layout
 from datagen.recipe.recipe import Recipe, read_recipe, recipe_to_text
 from datagen.rendering.quarantine import quarantined_scenes
@@ -31,7 +31,7 @@ def verify_dataset(
     *,
     workers: int | None = None,
     sampled_pixels: int = SAMPLED_PIXELS,
-    only: Collection[tuple[str, int]] | None = None,
+    only: Collection[SceneKey] | None = None,
 ) -> VerifyReport:
     """Check every file and every frame of a data set, or every file of shards exported from one.
 
@@ -93,7 +93,7 @@ def _opened(root: Path | str) -> Iterator[Layout]:
         yield open_layout(root)
         return
     with temporary_folder() as folder:
-        yield open_mirror(tree, folder)
+        yield open_remote(tree, folder)
 
 
 def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
@@ -115,7 +115,7 @@ def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
 
 def _check(check: SceneCheck) -> SceneCheck:
     result = check.run()
-    if isinstance(check.layout, MirroredLayout):
+    if isinstance(check.layout, RemoteLayout):
         check.layout.forget(check.split, check.scene)
     return result
 
