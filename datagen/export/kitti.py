@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.export.lidar import lidar_mask
 from datagen.formats import write_png
+from datagen.sources.kitti import UNITS_PER_PX
 from scenes.shapes.street.vehicles import VEHICLE_PARTS
 from scenes.spec import Scene
 from scenes.streets.traffic import vehicle_of
@@ -25,7 +26,6 @@ from stereoforge_kit.files import Tree
 
 FOLDERS = {"train": "training", "val": "validation", "test": "testing"}
 """KITTI has no validation set and keeps the ground truth of its testing set to itself; here all have it."""
-SCALE = 256.0
 VEHICLE_NUMBERS = 255
 """An object map is 8-bit: after so many the numbers begin again at 1, so that no vehicle becomes background."""
 
@@ -50,7 +50,7 @@ def export_kitti(
 
 def encode_disparity(disparity: NDArray[np.float32], keep: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """(H, W) px to KITTI's numbers; 0 where not kept, not finite, zero (infinitely far) or too large to store."""
-    scaled = np.rint(np.nan_to_num(disparity).astype(np.float64) * SCALE)
+    scaled = np.rint(np.nan_to_num(disparity).astype(np.float64) * UNITS_PER_PX)
     storable = keep & (disparity > 0) & (scaled <= np.iinfo(np.uint16).max)
     # Something valid must not become invalid by rounding; KITTI's own writer raises it to 1 too.
     return np.where(storable, np.maximum(scaled, 1), 0).astype(np.uint16)

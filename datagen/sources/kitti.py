@@ -1,8 +1,8 @@
-"""KITTI 2012 and 2015 (Geiger et al., CVPR 2012; Menze and Geiger, CVPR 2015): the training part, sparse truth.
+"""KITTI 2012 and 2015 (Geiger et al., CVPR 2012; Menze and Geiger, CVPR 2015): sparse ground truth.
 
 Disparity of the left view as 16-bit PNG, d = value / 256, 0 where there is none. `occ` holds all points, `noc` those
-the right view shows. The truth that 2015 calls `disp_occ_1` is the left view's one frame later, not the right
-view's, so there is no right disparity here.
+the right view shows. What 2015 calls `disp_occ_1` is the left view's disparity one frame later, not the
+right view's, so there is no right disparity here. The frames with ground truth are those of the training part.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from datagen.errors import FormatError
 from datagen.formats import read_png
 from datagen.formats.picture import read_picture
 from datagen.ground_truth.from_disparity import occlusion_from_mask
-from datagen.sources.registry import SourceFormat
+from datagen.sources.registry import DataSource, SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 UNITS_PER_PX = 256
+"""Of the 16-bit PNG files; 0 stands for no disparity."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +37,16 @@ class _Edition:
     objects: str | None = None
 
 
-_KITTI_2012 = (
-    _Edition("colored_0", "colored_1", "disp_occ", "disp_noc"),
-    _Edition("image_0", "image_1", "disp_occ", "disp_noc"),
-)
-"""With the colour images, or with the grey ones only."""
-_KITTI_2015 = (_Edition("image_2", "image_3", "disp_occ_0", "disp_noc_0", "obj_map"),)
+_EDITIONS = {
+    "kitti2012": (
+        _Edition("colored_0", "colored_1", "disp_occ", "disp_noc"),
+        _Edition("image_0", "image_1", "disp_occ", "disp_noc"),
+    ),
+    "kitti2015": (_Edition("image_2", "image_3", "disp_occ_0", "disp_noc_0", "obj_map"),),
+}
+"""By the name of the format. KITTI 2012 comes with colour images, or with the grey ones only."""
+_REFERENCE_FRAMES = "*_10.png"
+"""Of the frames 00 to 20 of a sequence, number 10 has ground truth and is the one that the server judges."""
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
@@ -87,7 +92,7 @@ def _find(root: str, split: str, editions: tuple[_Edition, ...]) -> Sequence[Ste
 
 
 def _frames(folder: Path, edition: _Edition) -> Iterator[FileFrame]:
-    for truth in sorted((folder / edition.all_points).glob("*_10.png")):
+    for truth in sorted((folder / edition.all_points).glob(_REFERENCE_FRAMES)):
         visible = folder / edition.visible_points / truth.name
         objects = None if edition.objects is None else folder / edition.objects / truth.name
         yield FileFrame(
@@ -100,15 +105,39 @@ def _frames(folder: Path, edition: _Edition) -> Iterator[FileFrame]:
         )
 
 
+def testing_frames(source: DataSource) -> Sequence[StereoFrame]:
+    """The frames of a KITTI source's testing part, empty where it is not there.
+
+    Only KITTI's server has their ground truth, so their disparity is NaN everywhere.
+    """
+    folder = Path(source.location) / "testing"
+    for edition in _EDITIONS[source.format.name]:
+        if (folder / edition.left).is_dir():
+            images = sorted((folder / edition.left).glob(_REFERENCE_FRAMES))
+            return FileFrames(_testing_frame(left, folder / edition.right / left.name) for left in images)
+    return []
+
+
+def _testing_frame(left: Path, right: Path) -> FileFrame:
+    return FileFrame(
+        name=left.stem,
+        read_left=partial(read_picture, left),
+        read_right=partial(read_picture, right),
+        read_disparity_left=partial(_unknown_disparity, left),
+    )
+
+
+def _unknown_disparity(image: Path) -> NDArray[np.float32]:
+    """(H, W) NaN, of the size of an image."""
+    return np.full(read_picture(image).shape[:2], np.nan, np.float32)
+
+
 FORMATS = tuple(
     SourceFormat(
         name,
         title,
-        partial(lambda root, editions: _edition(root, editions) is not None, editions=editions),
-        partial(_find, editions=editions),
+        partial(lambda root, editions: _edition(root, editions) is not None, editions=_EDITIONS[name]),
+        partial(_find, editions=_EDITIONS[name]),
     )
-    for name, title, editions in (
-        ("kitti2012", "KITTI 2012", _KITTI_2012),
-        ("kitti2015", "KITTI 2015", _KITTI_2015),
-    )
+    for name, title in (("kitti2012", "KITTI 2012"), ("kitti2015", "KITTI 2015"))
 )
