@@ -11,8 +11,6 @@ from pathlib import Path
 
 import bpy
 
-DEVICES = ("cpu", "cuda", "optix", "hip", "metal")
-
 
 @dataclass(frozen=True)
 class CyclesSettings:
@@ -21,7 +19,7 @@ class CyclesSettings:
     samples: int = 4
     """Paths a pixel; the denoiser makes 4 look clean."""
     device: str = "cpu"
-    """One of `DEVICES`."""
+    """`cpu`, `cuda`, `optix`, `hip` or `metal`."""
     threads: int = 1
     """CPU threads of this process."""
 
@@ -93,7 +91,7 @@ def _configure_cycles(scene: bpy.types.Scene, settings: CyclesSettings) -> None:
 
 
 def finds_device(device: str) -> bool:
-    """Whether Cycles can compute on one of `DEVICES` here."""
+    """Whether Cycles can compute on this machine's `cpu`, or finds a `cuda`, `optix`, `hip` or `metal` device."""
     return device == "cpu" or bool(_cycles_preferences().get_devices_for_type(device.upper()))
 
 
