@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,31 +12,17 @@ from scenes.geometry.mesh import Mesh
 from scenes.spec import Shape
 
 
+@dataclass(frozen=True, eq=False)
 class SceneGeometry:
-    """The meshes of a scene's objects, each distinct shape built once, and where their vertices are."""
+    """The meshes of a scene's objects and where their vertices are; made by `build_geometry`."""
 
+    scene: Scene
     meshes: tuple[Mesh, ...]
     """In the order of `Scene.objects`; objects of equal shape share one."""
     triangles: NDArray[np.int32]
     """(T, 3) indices into the vertices of all objects together."""
     owners: NDArray[np.int32]
     """(T,) index in `Scene.objects` of the object each triangle belongs to."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        built: dict[Shape, Mesh] = {}
-        for thing in scene.objects:
-            if thing.shape not in built:
-                built[thing.shape] = thing.shape.mesh()
-        self.meshes = tuple(built[thing.shape] for thing in scene.objects)
-        first = np.cumsum([0, *(len(mesh.vertices) for mesh in self.meshes)])
-        self.triangles = np.concatenate(
-            [np.zeros((0, 3), np.int32)]
-            + [mesh.triangles + np.int32(start) for mesh, start in zip(self.meshes, first, strict=False)]
-        )
-        self.owners = np.repeat(
-            np.arange(len(self.meshes), dtype=np.int32), [len(mesh.triangles) for mesh in self.meshes]
-        )
 
     def local_vertices(self, index: int, time_frames: float) -> NDArray[np.float64]:
         """(V, 3) vertices of one object at an instant, deformed, in mesh coordinates."""
@@ -53,3 +41,19 @@ class SceneGeometry:
             pose = pose if to_frame is None else to_frame @ pose
             placed.append(self.local_vertices(index, time_frames) @ pose[:3, :3].T + pose[:3, 3])
         return np.concatenate(placed)
+
+
+def build_geometry(scene: Scene) -> SceneGeometry:
+    """Build the meshes of a scene's objects, each distinct shape once."""
+    built: dict[Shape, Mesh] = {}
+    for thing in scene.objects:
+        if thing.shape not in built:
+            built[thing.shape] = thing.shape.mesh()
+    meshes = tuple(built[thing.shape] for thing in scene.objects)
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    triangles = np.concatenate(
+        [np.zeros((0, 3), np.int32)]
+        + [mesh.triangles + np.int32(start) for mesh, start in zip(meshes, first, strict=False)]
+    )
+    owners = np.repeat(np.arange(len(meshes), dtype=np.int32), [len(mesh.triangles) for mesh in meshes])
+    return SceneGeometry(scene, meshes, triangles, owners)

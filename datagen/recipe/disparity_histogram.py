@@ -55,7 +55,7 @@ class DisparityHistogram:
     shares: tuple[float, ...]
     """Of each bin; they add up to 1."""
     components: tuple[Component, ...] = ()
-    """What meets it, found by `fitted`."""
+    """The mixture that meets it, found by `fit_components`; empty until then."""
 
     def __post_init__(self) -> None:
         if len(self.edges_px) != len(self.shares) + 1 or not self.shares:
@@ -68,7 +68,13 @@ class DisparityHistogram:
             raise DatasetError(f"the shares of a disparity histogram must add up to 1, got {self.shares}")
 
     def component(self, scene: int) -> Component:
-        """That of the scene-th scene of a split: any run of scenes holds each about as often as its share says."""
+        """The component of a split's scene with this number.
+
+        Any run of scenes holds each component about as often as its share says. Raises ValueError if there are no
+        components yet.
+        """
+        if not self.components:
+            raise ValueError("the disparity histogram has no components yet; fit_disparities finds them")
         turn = (scene + 0.5) * _GOLDEN % 1.0
         bounds = np.cumsum([component.share for component in self.components])
         return self.components[min(int(np.searchsorted(bounds, turn * bounds[-1])), len(bounds) - 1)]
@@ -85,7 +91,7 @@ def with_depths(world: FamilyConfig, component: Component) -> FamilyConfig:
     return world if component.ratio is None else world.within_disparities(1.0, component.ratio)
 
 
-def fitted(wanted: DisparityHistogram, world: FamilyConfig, seed: int) -> DisparityHistogram:
+def fit_components(wanted: DisparityHistogram, world: FamilyConfig, seed: int) -> DisparityHistogram:
     """The histogram with the components that come nearest to it for a family's worlds.
 
     Least squares between the cumulative distributions at the edges, over mixtures (non-negative shares that add up to

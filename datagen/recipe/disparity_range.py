@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from scenes import Scene
 
 RAYS_ACROSS = 64
@@ -23,7 +23,7 @@ REACHED_PERCENT = 99.5
 
 def surface_disparities(scene: Scene) -> NDArray[np.float64]:
     """(P,) px, of what a coarse grid of the left view's pixels shows in the first and last frame, but the sky."""
-    caster = SceneRayCaster(SceneGeometry(scene))
+    caster = SceneRayCaster(build_geometry(scene))
     rows, columns = caster.coarse_pixels(RAYS_ACROSS)
     seen = [caster.cast("left", frame, rows, columns) for frame in sorted({0, scene.frames - 1})]
     return np.concatenate([hits.disparity[hits.object_index > 0] for hits in seen])

@@ -17,7 +17,7 @@ from datagen.dataset.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
 from datagen.errors import DatasetError
 from datagen.formats.limits import MAX_ELEMENTS, read_bounded
 from datagen.recipe.curation import Curation
-from datagen.recipe.disparity_histogram import DisparityHistogram, fitted, with_depths
+from datagen.recipe.disparity_histogram import DisparityHistogram, fit_components, with_depths
 from datagen.recipe.disparity_range import REACHED_PERCENT, with_disparity_at
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
 from scenes.serialization import OMIT_DEFAULT, from_plain, to_plain
@@ -30,7 +30,11 @@ MAX_RECIPE_DEPTH = 32
 
 @dataclass(frozen=True)
 class Recipe:
-    """What to render. Two runs of one recipe give the same bytes, however the work is spread."""
+    """What to render. Two runs of one recipe give the same bytes, however the work is spread.
+
+    Constructing a recipe checks its values and does nothing else. Raises DatasetError for values that no data
+    set can have.
+    """
 
     world: FamilyConfig
     """The family's own config; the image size and the frames a scene are in it."""
@@ -52,7 +56,10 @@ class Recipe:
     is validated and tested on is the family's own from the first scene."""
     curation: Curation = field(default_factory=Curation)
     disparities: DisparityHistogram | None = field(default=None, metadata=OMIT_DEFAULT)
-    """How the disparities of all scenes together shall be spread; None for whatever the family gives."""
+    """How the disparities of all scenes together shall be spread; None for whatever the family gives.
+
+    Its components are found by `fit_disparities`, which everything that samples scenes needs first.
+    """
 
     def __post_init__(self) -> None:
         for split, count in self.scenes.items():
@@ -88,8 +95,6 @@ class Recipe:
             raise DatasetError(str(error)) from error
         if self.disparities and self.curation.disparity_px:
             raise DatasetError("a recipe has a range of disparities or a histogram of them, not both")
-        if self.disparities and not self.disparities.components:
-            object.__setattr__(self, "disparities", fitted(self.disparities, self.world, self.seed))
         if self.seed < 0:
             raise DatasetError(f"the seed must not be negative, got {self.seed}")
 
@@ -117,7 +122,10 @@ class Recipe:
         return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
     def sample(self, split: str, index: int, attempt: int = 0) -> Scene:
-        """The index-th scene of a split; splits, scenes and attempts draw from unrelated random streams."""
+        """Sample the index-th scene of a split. Splits, scenes and attempts draw from unrelated random streams.
+
+        Raises ValueError if the recipe's disparity histogram has no components yet (`fit_disparities`).
+        """
         key = (SPLITS.index(split), index) + ((attempt,) if attempt else ())
         sequence = np.random.SeedSequence(self.seed, spawn_key=key)
         world = self.world
@@ -131,6 +139,17 @@ class Recipe:
         if wanted and not world.depths_for_range:
             scene = with_disparity_at(scene, REACHED_PERCENT, wanted[1])
         return with_disparity_at(scene, 50.0, component.median_px) if component else scene
+
+
+def fit_disparities(recipe: Recipe) -> Recipe:
+    """The recipe with the components of its disparity histogram, ready to sample scenes.
+
+    Unchanged if the recipe asks for no histogram or already has the components. Otherwise some scenes are
+    sampled and ray-cast, which takes seconds.
+    """
+    if recipe.disparities is None or recipe.disparities.components:
+        return recipe
+    return replace(recipe, disparities=fit_components(recipe.disparities, recipe.world, recipe.seed))
 
 
 def _check_names(what: str, names: tuple[str, ...], known: Collection[str]) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from datagen.dataset.layout import KINDS, SPLITS, Layout
 from datagen.dataset.manifest import SceneManifest, read_manifest
 from datagen.errors import DatasetError
-from datagen.recipe.recipe import Recipe
+from datagen.recipe.recipe import Recipe, fit_disparities
 from datagen.rendering.run import committed_scenes, render_dataset
 from stereoforge_kit.files import open_tree, temporary_folder
 
@@ -54,7 +54,8 @@ def estimate_run(
     frames = recipe.world.frames * sum(missing.values())
     if not frames:
         return Estimate(missing, already, 0, 0.0, 0.0)
-    manifest = _measured(recipe, root, next(split for split, count in missing.items() if count), device)
+    split = next(split for split, count in missing.items() if count)
+    manifest = _measured(fit_disparities(recipe), root, split, device)
     steps = manifest.seconds
     once = sum(steps[name] for name in ONCE_A_SCENE)
     seconds = once + recipe.world.frames * (sum(steps.values()) - once)

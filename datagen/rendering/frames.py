@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from datagen.dataset.layout import VIEWS, Direction, View
 from datagen.ground_truth.labels import forward_differences, gradient_validity
 from datagen.ground_truth.raycast import Hits, SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.ground_truth.targets import ExtraTargets
 from datagen.rendering.exposure import automatic_exposure, develop
 from datagen.rendering.sensor import Sensor
@@ -106,7 +106,7 @@ def render_frames(
     exposure: float | None = None
     try:
         with watch.step("build"), quiet(log):
-            caster = caster or SceneRayCaster(SceneGeometry(scene))
+            caster = caster or SceneRayCaster(build_geometry(scene))
             settings = CyclesSettings(options.samples, options.device, options.threads)
             world = build_world(caster.geometry, start_empty_file(settings))
         sensor = Sensor(scene)

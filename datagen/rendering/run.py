@@ -14,7 +14,7 @@ from datagen.dataset.manifest import SceneManifest
 from datagen.errors import DatasetError, DiskFullError
 from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
 from datagen.executors.devices import assign_devices, find_gpus
-from datagen.recipe.recipe import Recipe, merge_into, recipe_from_text, write_recipe
+from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_from_text, write_recipe
 from datagen.rendering.preflight import check_device, check_disparity_range
 from datagen.rendering.quarantine import (
     QuarantinedScene,
@@ -77,6 +77,7 @@ def render_dataset(
     if isinstance(tree, LocalTree) and tree.root.exists() and not tree.root.is_dir():
         raise DatasetError(f"{tree.name} is a file, not a folder; give a new or empty folder")
     wanted = list(_wanted(recipe, shard))
+    recipe = fit_disparities(recipe)
     merged = _merge(tree, recipe)
     if wanted:
         _check_store(tree, recipe)

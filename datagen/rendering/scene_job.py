@@ -27,7 +27,7 @@ from datagen.formats import (
 )
 from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.curation import TEXTURELESS, fault_before_rendering, is_textureless
 from datagen.recipe.recipe import Recipe
 from datagen.rendering.frames import BLENDER_LOG, RenderOptions, Stopwatch, ViewTargets, render_frames
@@ -76,7 +76,7 @@ def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, 
     for attempt in range(job.recipe.curation.attempts):
         with watch.step("sample"):
             scene = job.recipe.sample(job.split, job.scene, attempt)
-            caster = SceneRayCaster(SceneGeometry(scene))
+            caster = SceneRayCaster(build_geometry(scene))
         with watch.step("ground_truth"):  # The tree of triangles built here serves the first frame too.
             fault = fault_before_rendering(caster, job.recipe.curation)
         frames = None if fault else _render_attempt(job, staging, caster, watch)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from datagen.dataset.layout import DIRECTIONS, FIRST_FRAME, RENDER_PASSES, VIEWS, Direction, View
 from datagen.dataset.samples import StereoSample
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.targets import PixelSurfaces, material_index, motion_boundaries
+from datagen.ground_truth.targets import PixelSurfaces, find_surfaces, material_index, motion_boundaries
 from datagen.recipe.recipe import Recipe
 from datagen.verify.checks import (
     check_derived,
@@ -104,7 +104,7 @@ class FrameCheck:
             return
         rows, columns = self._sampled(view)
         instant = sample.frame - FIRST_FRAME
-        surfaces = PixelSurfaces(self.caster, view, instant, rows, columns)
+        surfaces = find_surfaces(self.caster, view, instant, rows, columns)
         if "material_index" in kinds:
             worn = material_index(self.scene, sample.view(view).object_index)
             for message in check_derived(sample.material_index(view), worn, "the objects' materials"):

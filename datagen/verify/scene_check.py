@@ -14,7 +14,7 @@ from datagen.dataset.samples import StereoSample, read_scene
 from datagen.errors import DatasetError
 from datagen.formats import read_camera_data
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.recipe import Recipe
 from datagen.verify.frame_check import FrameCheck
 from datagen.verify.report import Problem
@@ -61,7 +61,7 @@ class SceneCheck:
             except DatasetError as error:
                 self._failed(error)
             else:
-                caster = SceneRayCaster(SceneGeometry(scene)) if self.sampled_pixels else None
+                caster = SceneRayCaster(build_geometry(scene)) if self.sampled_pixels else None
                 self._check_contents(scene, caster)
         return self
 

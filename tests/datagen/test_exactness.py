@@ -16,7 +16,7 @@ from scipy.ndimage import map_coordinates
 from datagen.dataset.layout import VIEWS, View
 from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
 from datagen.ground_truth.raycast import Hits, SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.rendering.frames import RenderOptions, ViewTargets, render_frames
 from scenes import FAMILIES, Scene, sample_scene
 from tests.datagen.oracle import cast_depth, segment_is_blocked, to_camera_frame
@@ -75,7 +75,7 @@ def worlds(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
     made = []
     for scene in scenes_of(request.param, MANY):
-        caster = SceneRayCaster(SceneGeometry(scene))
+        caster = SceneRayCaster(build_geometry(scene))
         with quiet(tmp_path_factory.mktemp("blender") / "log"):
             place(build_world(caster.geometry, start_empty_file(CyclesSettings(samples=1))), "left", 0.0)
         made.append(World(scene, {view: caster.cast_all(view, 0.0) for view in VIEWS}, evaluated_triangles()))
@@ -104,7 +104,7 @@ def cycles_disparity(scene: Scene, scratch: Path) -> NDArray[np.float64]:
         blender_scene.view_layers[0].use_pass_z = True
         blender_scene.cycles.use_denoising = False
         blender_scene.cycles.pixel_filter_type, blender_scene.cycles.filter_width = "BOX", 0.01
-        world = build_world(SceneGeometry(scene), blender_scene)
+        world = build_world(build_geometry(scene), blender_scene)
         place(world, "left", 0.0)
         channels = render_channels(world, "depth", 0, scratch)
     depth = channels["Depth.Z" if "Depth.Z" in channels else "Depth.V"].astype(np.float64)
@@ -210,7 +210,7 @@ def test_cycles_shows_the_surfaces_that_the_truth_is_of(pictures: list[Picture])
 
 @pytest.mark.slow
 def test_what_is_rendered_is_what_is_compared_here(pictures: list[Picture]) -> None:
-    caster = SceneRayCaster(SceneGeometry(pictures[0].scene))
+    caster = SceneRayCaster(build_geometry(pictures[0].scene))
     for view in VIEWS:
         hits, targets = caster.cast_all(view, 0.0), pictures[0].targets[view]
         assert np.array_equal(targets.disparity, hits.disparity.astype(np.float32))

@@ -14,7 +14,7 @@ from datagen.blender.camera import render_radiance
 from datagen.blender.final_pass import HAZE_HEIGHT, render_final
 from datagen.blender.session import CyclesSettings, quiet, start_empty_file
 from datagen.dataset.layout import VIEWS, View
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.rendering.frames import RenderOptions, ViewTargets, render_frames
 from datagen.rendering.sensor import Sensor, vignette
 from scenes import Scene
@@ -58,7 +58,7 @@ def plate(motion: Trajectory, depth_scale: float = 1.0) -> SceneObject:
 
 def built(scene: Scene, folder: Path, samples: int = 32) -> BuiltWorld:
     with quiet(folder / "log"):
-        return build_world(SceneGeometry(scene), start_empty_file(CyclesSettings(samples)))
+        return build_world(build_geometry(scene), start_empty_file(CyclesSettings(samples)))
 
 
 def final_radiance(scene: Scene, folder: Path, frame: int = 0, exposure: float = 1.0) -> NDArray[np.float32]:

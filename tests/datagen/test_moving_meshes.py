@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from datagen.dataset.layout import VIEWS, View
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.rendering.frames import RenderOptions, ViewTargets, render_frames
 from scenes import Scene
 from scenes.motion.deformations.sway import Sway
@@ -75,7 +75,7 @@ def test_every_frame_shows_the_shapes_of_its_instant(
 ) -> None:
     scene, frames, _ = rendered
     targets, blenders_triangles = frames[frame]
-    own = SceneGeometry(scene)
+    own = build_geometry(scene)
     camera = scene.camera
     for corners in (own.vertices(frame)[own.triangles], blenders_triangles):
         triangles = to_camera_frame(corners, camera.pose(view, frame))
@@ -91,7 +91,7 @@ def test_every_frame_shows_the_shapes_of_its_instant(
 
 def test_labels_and_occlusion_follow_the_deformed_shapes(rendered: tuple[Scene, Frames, int]) -> None:
     scene, frames, _ = rendered
-    caster = SceneRayCaster(SceneGeometry(scene))
+    caster = SceneRayCaster(build_geometry(scene))
     rows, columns = (grid.ravel() for grid in np.mgrid[:HEIGHT, :WIDTH])
     for frame, (targets, _) in enumerate(frames):
         for view in VIEWS:
@@ -117,7 +117,7 @@ def test_a_frame_looks_the_same_whatever_was_rendered_before(
     radiance = []
     for frames in ((2,), (0, 2)):
         with quiet(tmp_path / "log"):
-            world = build_world(SceneGeometry(rendered[0]), start_empty_file(CyclesSettings(samples=1)))
+            world = build_world(build_geometry(rendered[0]), start_empty_file(CyclesSettings(samples=1)))
             views = [render_view(world, "left", frame, tmp_path) for frame in frames]
         radiance.append(views[-1])
     assert np.array_equal(*radiance)

@@ -20,8 +20,8 @@ from datagen.dataset.manifest import file_entry, read_manifest, write_manifest
 from datagen.formats import write_flow, write_mask, write_normals, write_pfm, write_png
 from datagen.gallery.page import write_gallery
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
-from datagen.ground_truth.targets import STEP, PixelSurfaces
+from datagen.ground_truth.scene_geometry import build_geometry
+from datagen.ground_truth.targets import STEP, PixelSurfaces, find_surfaces
 from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, Scene
 from scenes.motion.trajectories import quaternion
@@ -137,9 +137,9 @@ def plane_seen(
 
 
 def surfaces(scene: Scene, view: View, time: float = NOW) -> PixelSurfaces:
-    geometry = SceneGeometry(scene)
+    geometry = build_geometry(scene)
     rows, columns = np.indices((scene.camera.height, scene.camera.width))
-    return PixelSurfaces(SceneRayCaster(geometry), view, time, rows, columns)
+    return find_surfaces(SceneRayCaster(geometry), view, time, rows, columns)
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
