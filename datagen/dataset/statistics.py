@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.dataset.samples import StereoSample
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME
 
 TEXTURE_WINDOW_PX = 9
 """Side of the window a pixel's texture is judged in, about what block matching compares."""

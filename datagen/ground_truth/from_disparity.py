@@ -10,13 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.dataset.layout import View
-from datagen.ground_truth.labels import (
-    OCCLUDED,
-    OUT_OF_FRAME,
-    VISIBLE,
-    forward_differences,
-    gradient_validity,
-)
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.ground_truth.labels import forward_differences, gradient_validity
 
 NEARER_PX = 1.0
 """What lies this much nearer in the other view hides the point; the field's usual margin."""

@@ -14,7 +14,8 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from datagen.dataset.layout import View
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.ground_truth.labels import SAME_SURFACE
 from datagen.ground_truth.scene_geometry import SceneGeometry
 
 _FAR = 1e30

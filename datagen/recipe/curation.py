@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from datagen.dataset.statistics import textured_share
 from datagen.errors import DatasetError
-from datagen.ground_truth.labels import VISIBLE
+from datagen.formats.occlusion import VISIBLE
 from datagen.ground_truth.raycast import SceneRayCaster
 
 TEXTURELESS = "textureless"

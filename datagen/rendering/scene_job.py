@@ -25,7 +25,7 @@ from datagen.formats import (
     write_pfm,
     write_png,
 )
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME
 from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.curation import TEXTURELESS, fault_before_rendering, is_textureless

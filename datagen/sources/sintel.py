@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats import read_png
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.formats.picture import read_picture
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 

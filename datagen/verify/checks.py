@@ -16,13 +16,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from datagen.dataset.layout import View
-from datagen.ground_truth.labels import (
-    OCCLUDED,
-    OUT_OF_FRAME,
-    VISIBLE,
-    forward_differences,
-    gradient_validity,
-)
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.ground_truth.labels import forward_differences, gradient_validity
 from datagen.ground_truth.raycast import Hits
 
 CONSISTENCY_TOLERANCE_PX = 0.25

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from datagen.dataset.layout import VIEWS, View
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.ground_truth.labels import SAME_SURFACE
 from datagen.ground_truth.raycast import Hits, SceneRayCaster
 from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.rendering.frames import RenderOptions, ViewTargets, render_frames

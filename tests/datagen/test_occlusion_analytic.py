@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from datagen.dataset.layout import View
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.rendering.frames import ViewTargets, render_frames
 from tests.datagen.worlds import BASELINE_M, Plate, plates
 
