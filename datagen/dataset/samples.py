@@ -1,4 +1,4 @@
-"""Reading a data set: a sequence of stereo samples whose arrays are read when they are asked for."""
+"""Reading a data set: a sequence of stereo samples whose arrays are read at first use."""
 
 from __future__ import annotations
 
@@ -46,10 +46,11 @@ class SampleView:
 
 @dataclass(frozen=True)
 class StereoSample:
-    """One frame of a scene. Every array is read at its first use and kept as long as the sample is.
+    """One frame of a scene: both views with their ground truth.
 
-    Reading raises DatasetError, naming the file, for one that is missing, not the one that the scene's manifest
-    describes by its SHA-256, or not of the size of the left image.
+    An array is read at its first use and kept as long as the sample. Reading raises DatasetError, naming the file,
+    for a file that is missing, differs from its SHA-256 in the scene's manifest, or does not have the size of the
+    left image.
     """
 
     layout: Layout
@@ -58,6 +59,7 @@ class StereoSample:
     frame: int
     """The frame's number on disk."""
     render_pass: str = "clean"
+    """Which images are read, "clean" or "final"."""
 
     @property
     def name(self) -> str:
@@ -103,22 +105,22 @@ class StereoSample:
 
     @property
     def gradient_valid_left(self) -> NDArray[np.bool_]:
-        """(H, W) where the gradient exists and is no discontinuity."""
+        """(H, W) True where the gradient exists and is no discontinuity."""
         return self._gradient_left[1]
 
     @property
     def gradient_valid_right(self) -> NDArray[np.bool_]:
-        """(H, W) where the gradient exists and is no discontinuity."""
+        """(H, W) True where the gradient exists and is no discontinuity."""
         return self._gradient_right[1]
 
     @cached_property
     def occlusion_left(self) -> NDArray[np.uint8]:
-        """(H, W) 0 visible in the right image, 1 occluded, 2 out of its frame."""
+        """(H, W) 0 visible in the right view, 1 occluded there, 2 out of its frame."""
         return self._occlusion("left")
 
     @cached_property
     def occlusion_right(self) -> NDArray[np.uint8]:
-        """(H, W) 0 visible in the left image, 1 occluded, 2 out of its frame."""
+        """(H, W) 0 visible in the left view, 1 occluded there, 2 out of its frame."""
         return self._occlusion("right")
 
     @cached_property
@@ -132,7 +134,7 @@ class StereoSample:
         return self._object_index("right")
 
     def view(self, view: View) -> SampleView:
-        """All arrays of the "left" or "right" view."""
+        """All arrays of the "left" or "right" view. Raises ValueError for another name."""
         if view not in VIEWS:
             raise ValueError(f"a view is 'left' or 'right', not {view!r}")
         return SampleView(
@@ -145,24 +147,27 @@ class StereoSample:
         )
 
     def material_index(self, view: View) -> NDArray[np.uint16]:
-        """(H, W) 0 sky, else 1 + index in the scene's materials. Needs the target, as the methods below do;
-        what they return is read anew at each call."""
+        """(H, W) 0 sky, else 1 + index in the scene's materials.
+
+        This method and those below read their file at each call. They raise DatasetError for a data set that was
+        rendered without the target.
+        """
         return self._extra("material_index", view, read_png, (), np.uint16)
 
     def normals(self, view: View) -> NDArray[np.float32]:
-        """(H, W, 3) unit vectors in the camera's frame (x right, y up, z back), 0 for the sky."""
+        """(H, W, 3) unit normals in the camera's frame (x right, y up, z towards the camera), 0 for the sky."""
         return self._extra("normals", view, read_normals, (3,), np.float32)
 
     def flow(self, view: View, direction: Direction) -> NDArray[np.float32]:
-        """(H, W, 2) px [right, down] to where the pixel's point is one frame on; NaN invalid."""
+        """(H, W, 2) optical flow in px [to the right, down] to the next or the previous frame; NaN invalid."""
         return self._extra("optical_flow", view, read_flow, (2,), np.float32, direction)
 
     def disparity_change(self, view: View, direction: Direction) -> NDArray[np.float32]:
-        """(H, W) px the disparity of the pixel's point grows by until one frame on; NaN invalid."""
+        """(H, W) px by which the disparity of a pixel's point grows until that frame; NaN invalid."""
         return self._extra("disparity_change", view, read_pfm, (), np.float32, direction)
 
     def motion_boundaries(self, view: View, direction: Direction) -> NDArray[np.bool_]:
-        """(H, W) where objects that move differently meet."""
+        """(H, W) True where objects that move differently meet."""
         return self._extra("motion_boundaries", view, read_mask, (), np.bool_, direction)
 
     @cached_property
@@ -171,7 +176,10 @@ class StereoSample:
         return read_scene(self.intact(self.layout.scene_record(self.split, self.scene)))
 
     def intact(self, path: Path) -> Path:
-        """A path of one of the scene's files, compared with its manifest. Raises DatasetError."""
+        """Compare one of the scene's files with the manifest and return its path.
+
+        Raises DatasetError for a file that is missing, damaged or not in the manifest.
+        """
         entry = self._entries.get(self.layout.relative(path))
         if entry is None:
             raise DatasetError(f"{path}: is not in the scene's manifest")
@@ -253,7 +261,7 @@ class StereoSample:
 
 
 class StereoDataset(Sequence[StereoSample]):
-    """The frames of all finished scenes of one split, in order; a scene without its manifest is not there."""
+    """The frames of all finished scenes of one split, in order, as `StereoSample`s."""
 
     def __init__(self, root: Path | str, split: str, render_pass: str = "clean") -> None:
         """Find the frames; no array is read yet.
@@ -316,7 +324,7 @@ class StereoDataset(Sequence[StereoSample]):
 def open_layout(root: Path | str) -> Layout:
     """The layout of an existing data set, in a folder or behind a URL.
 
-    Raises DatasetError for a folder that is missing or is none.
+    Raises DatasetError for a folder that is missing or no data set.
     """
     tree = open_tree(root)
     if not isinstance(tree, LocalTree):
@@ -330,7 +338,7 @@ def open_layout(root: Path | str) -> Layout:
 
 
 def read_scene(path: Path) -> Scene:
-    """Read a Scene record of a data set. Raises DatasetError for one that is missing or describes no scene."""
+    """Read a Scene record of a data set. Raises DatasetError for a file that is missing or no such record."""
     use_store(Layout(path.parents[3]).assets)
     try:
         return scene_from_json(read_bounded(path, MAX_JSON_BYTES).decode("utf-8"))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 SAME_SURFACE = 1e-4
 """Share of the distance within which a hit still counts as the surface itself.
 
-Occlusion's rays are cast in 32 bits; two surfaces this close differ by less than 0.02 px at the largest disparities.
+Occlusion rays are cast with 32-bit floats. Two surfaces this close differ by less than 0.02 px at the largest
+disparities.
 """
 
 

@@ -1,4 +1,4 @@
-"""The triangles of a Scene at any instant, straight from its record: no Blender."""
+"""The triangles of a Scene at any instant, built from its record without Blender."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class SceneGeometry:
     triangles: NDArray[np.int32]
     """(T, 3) indices into the vertices of all objects together."""
     owners: NDArray[np.int32]
-    """(T,) index in `Scene.objects` of the object each triangle belongs to."""
+    """(T,) index in `Scene.objects` of the object that each triangle belongs to."""
 
     def local_vertices(self, index: int, time_frames: float) -> NDArray[np.float64]:
-        """(V, 3) vertices of one object at an instant, deformed, in mesh coordinates."""
+        """(V, 3) vertices of one object at an instant, deformed, in the mesh's own coordinates."""
         deformation = self.scene.objects[index].deformation
         vertices = self.meshes[index].vertices
         return vertices if deformation is None else deformation.deformed(vertices, time_frames)
@@ -33,8 +33,10 @@ class SceneGeometry:
     def vertices(
         self, time_frames: float, to_frame: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """(V, 3) vertices of all objects at an instant, in the world or, after the (4, 4) matrix
-        `to_frame`, in another frame of reference."""
+        """(V, 3) vertices of all objects at an instant, in metres.
+
+        to_frame: A (4, 4) matrix from the world to the frame of reference asked for; None for the world.
+        """
         placed = [np.zeros((0, 3))]
         for index, thing in enumerate(self.scene.objects):
             pose = thing.pose(time_frames)

@@ -1,8 +1,8 @@
 """Targets that follow the surface a pixel shows: normals, optical flow, disparity change, motion boundaries.
 
-The point seen through a pixel's centre is a place on a triangle; where the triangle's vertices are at another
-instant, moved, turned and deformed, and seen by the camera of that instant, says exactly where the point has
-gone. Everything is 64-bit and independent of what Blender rendered.
+A pixel's centre shows a point of a triangle. At another instant the triangle's vertices have moved, turned and
+deformed, and so has the camera; where they are then gives the point's place exactly. Everything is computed with
+64-bit floats and independent of what Blender rendered.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from datagen.ground_truth.scene_geometry import SceneGeometry
 from scenes import Scene
 
 STEP: dict[Direction, int] = {"into_future": 1, "into_past": -1}
-"""Frames from a pixel's instant to the one its point is followed to."""
+"""Frames from a pixel's instant to the one that its point is followed to."""
 BOUNDARY_STEP_PX = 1.5
 """Neighbouring pixels of two objects whose flows differ by at least this lie on a motion boundary."""
 BOUNDARY_PIXELS = 10
-"""A boundary of fewer connected pixels is none (both thresholds: Mayer et al. 2016, section 4)."""
+"""Fewer connected pixels than this are no boundary (both thresholds: Mayer et al., CVPR 2016, section 4)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +61,9 @@ class PixelSurfaces:
         return self._picture(normals, np.zeros((len(self.is_hit), 3)))
 
     def flow(self, direction: Direction) -> NDArray[np.float32]:
-        """(*S, 2) displacement [to the right, down] in px to where the point is seen one frame on.
+        """(*S, 2) optical flow [to the right, down] in px to the next or the previous frame.
 
-        NaN for points that will be behind the camera. The sky moves with the camera's rotation only.
+        It is NaN for points that are behind the camera then. The sky moves with the camera's rotation only.
         """
         time = self.time_frames + STEP[direction]
         camera = self.geometry.scene.camera
@@ -77,7 +77,10 @@ class PixelSurfaces:
         return (seen - self.centres).reshape(*self.shape, 2).astype(np.float32)
 
     def disparity_change(self, direction: Direction) -> NDArray[np.float32]:
-        """(*S,) px by which the point's disparity grows until one frame on; NaN behind the camera, sky 0."""
+        """(*S,) px by which the point's disparity grows until the next or the previous frame.
+
+        It is NaN for points that are behind the camera then, and 0 for the sky.
+        """
         fb = self.geometry.scene.camera.disparity_metres
         now, then = (
             -self._points_at(time)[:, 2] for time in (self.time_frames, self.time_frames + STEP[direction])
@@ -125,13 +128,13 @@ def find_surfaces(
 
 
 def material_index(scene: Scene, object_index: NDArray[np.integer[Any]]) -> NDArray[np.uint16]:
-    """(H, W) 0 for the sky, else 1 + the index in `Scene.materials`, of what (H, W) objects wear."""
+    """(H, W) 0 for the sky, else 1 + the index in `Scene.materials` of the object that (H, W) object_index names."""
     worn = [0, *(1 + thing.material for thing in scene.objects)]
     return np.array(worn, np.uint16)[object_index]
 
 
 def motion_boundaries(flow: NDArray[np.float32], object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
-    """(H, W) where two objects meet that move differently, by the (H, W, 2) flow of one direction."""
+    """(H, W) True where two objects that move differently meet, by the (H, W, 2) flow in px of one direction."""
     marked = np.zeros(object_index.shape, bool)
     for axis in (0, 1):
         first = tuple(slice(0, -1) if k == axis else slice(None) for k in (0, 1))
@@ -146,16 +149,19 @@ def motion_boundaries(flow: NDArray[np.float32], object_index: NDArray[np.intege
 
 
 class ExtraTargets:
-    """Makes the targets a recipe asks for besides the basic ones."""
+    """Makes the targets that a recipe asks for besides the basic ones."""
 
     def __init__(self, caster: SceneRayCaster, kinds: tuple[str, ...]) -> None:
-        """kinds: among `datagen.dataset.layout.EXTRA_TARGETS`."""
+        """kinds: Names among `datagen.dataset.layout.EXTRA_TARGETS`."""
         self._caster, self._kinds = caster, kinds
 
     def make(
         self, view: View, frame: int, object_index: NDArray[np.integer[Any]]
     ) -> dict[tuple[str, Direction | None], NDArray[Any]]:
-        """The arrays of one view and frame, by kind and direction. object_index: (H, W), the frame's."""
+        """The arrays of one view and frame, by kind and direction of time.
+
+        frame: The instant, from 0. object_index: (H, W) of that view and frame.
+        """
         made: dict[tuple[str, Direction | None], NDArray[Any]] = {}
         if "material_index" in self._kinds:
             made["material_index", None] = material_index(self._caster.geometry.scene, object_index)

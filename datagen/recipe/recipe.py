@@ -1,4 +1,4 @@
-"""The recipe of a data set: all that decides its bytes, as a typed record and as `recipe.yaml`."""
+"""The recipe of a data set: everything that decides its bytes, as a typed record and as `recipe.yaml`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ from scenes.user_assets.pool import AssetPool
 from stereoforge_kit.files import write_text
 
 MAX_RECIPE_BYTES = 1 << 20
+"""Largest recipe file that is read."""
 MAX_RECIPE_DEPTH = 32
+"""Deepest nesting that a recipe file may have."""
 
 
 @dataclass(frozen=True)
@@ -37,26 +39,29 @@ class Recipe:
     """
 
     world: FamilyConfig
-    """The family's own config; the image size and the frames a scene are in it."""
+    """The family's config, which has the image size and the number of frames in a scene too."""
     scenes: dict[str, int]
     """How many scenes each split has."""
     seed: int = 0
+    """Everything random follows from it."""
     samples: int = 4
-    """Paths a pixel for the pictures; ground truth is exact whatever this is."""
+    """Paths per pixel for the pictures. Ground truth is exact whatever this is."""
     passes: tuple[str, ...] = ("clean",)
+    """Render passes, among "clean" and "final" (motion blur, defocus, fog, sensor noise)."""
     targets: tuple[str, ...] = ()
     """Targets besides disparity, gradient, occlusion and object index, which are always made."""
     gradient_threshold_px: float = 1.0
-    """Jumps above this are discontinuities, masked out of the gradient targets."""
+    """Larger forward differences are discontinuities and masked out of the gradient targets."""
 
     assets: AssetPool = field(default_factory=AssetPool)
-    """The user assets; each belongs to one split only."""
+    """The user assets. Each belongs to one split only."""
     curriculum_scenes: int = 0
-    """Over so many scenes of the train split the worlds grow from few and simple to the family's own; 0 for none. What
-    is validated and tested on is the family's own from the first scene."""
+    """Over so many scenes the worlds of the train split grow from few and simple things to the family's own; 0 for no
+    such curriculum. Scenes of the other splits are the family's own from the first."""
     curation: Curation = field(default_factory=Curation)
+    """Which scenes are rejected and sampled again."""
     disparities: DisparityHistogram | None = field(default=None, metadata=OMIT_DEFAULT)
-    """How the disparities of all scenes together shall be spread; None for whatever the family gives.
+    """The histogram of disparities that all scenes together shall have; None for whatever the family gives.
 
     Its components are found by `fit_disparities`, which everything that samples scenes needs first.
     """
@@ -114,10 +119,11 @@ class Recipe:
 
     @property
     def family(self) -> str:
+        """The name of the family of worlds."""
         return next(name for name, family in FAMILIES.items() if type(self.world) is family.config)
 
     def settings_sha256(self) -> str:
-        """Identifies everything but the numbers of scenes, which may grow."""
+        """The SHA-256 of all settings but the numbers of scenes, which may grow."""
         settings = to_plain(replace(self, scenes={}))
         return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
@@ -161,7 +167,7 @@ def _check_names(what: str, names: tuple[str, ...], known: Collection[str]) -> N
 
 
 def recipe_from_plain(data: Any, origin: str) -> Recipe:
-    """Raises DatasetError naming `origin` for anything that is not a recipe."""
+    """A recipe from parsed YAML. Raises DatasetError, naming `origin`, for anything that is not a recipe."""
     if not isinstance(data, dict):
         raise DatasetError(f"{origin} is not a valid recipe: it has no settings, such as world: and scenes:")
     try:
@@ -171,7 +177,7 @@ def recipe_from_plain(data: Any, origin: str) -> Recipe:
 
 
 def recipe_from_text(text: bytes, origin: str) -> Recipe:
-    """Raises DatasetError naming `origin` for bytes that are no YAML, or no recipe."""
+    """A recipe from YAML text in UTF-8. Raises DatasetError, naming `origin`, for text that is no YAML or no recipe."""
     if len(text) > MAX_RECIPE_BYTES:
         raise DatasetError(f"cannot read the recipe {origin}: {len(text)} bytes are more than any recipe has")
     try:
@@ -183,14 +189,14 @@ def recipe_from_text(text: bytes, origin: str) -> Recipe:
 
 
 def _reason(error: Exception) -> str:
-    """What is wrong with a text, and in which line, without the parser's account of what it was about to do."""
+    """What is wrong with a YAML text, and in which line, without the parser's account of what it was doing."""
     if isinstance(error, yaml.MarkedYAMLError) and error.problem and error.problem_mark:
         return f"line {error.problem_mark.line + 1}: {error.problem}"
     return " ".join(str(error).split())
 
 
 def _check_shape(text: str) -> None:
-    """Raise ValueError for nesting and repetition by reference that no recipe has and that could grow without end."""
+    """Raise ValueError for deep nesting and for references, which no recipe has and which could grow without end."""
     depth = 0
     for event in yaml.parse(text, yaml.SafeLoader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
@@ -199,27 +205,29 @@ def _check_shape(text: str) -> None:
 
 
 def read_recipe(path: Path) -> Recipe:
-    """Raises DatasetError for a file that is missing, no YAML, or no recipe."""
+    """Read a recipe file. Raises DatasetError for a file that is missing, no YAML or no recipe."""
     if not path.exists():
         raise DatasetError(f"there is no recipe {path}")
     return recipe_from_text(read_bounded(path, MAX_RECIPE_BYTES), str(path))
 
 
 def recipe_to_text(recipe: Recipe) -> str:
+    """A recipe as YAML text, which `recipe_from_text` reads."""
     return yaml.safe_dump(to_plain(recipe), sort_keys=False)
 
 
 def write_recipe(path: Path, recipe: Recipe) -> None:
+    """Write a recipe file, which `read_recipe` reads."""
     write_text(path, recipe_to_text(recipe))
 
 
 def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
-    """The recipe of a folder that already has one: scenes may be added, nothing else may change.
+    """The recipe of a folder that already has one, with the scenes that another recipe adds.
 
-    Raises DatasetError naming the first setting that differs.
+    Nothing else may change. Raises DatasetError, naming `folder` and the first setting that differs.
     """
     before, after = (_flat(to_plain(replace(recipe, scenes={}))) for recipe in (existing, wanted))
-    # Another family has other settings altogether; that it is another one is what to say.
+    # Another family has other settings altogether: name the family first.
     for key in sorted(set(before) | set(after), key=lambda key: (key != "world.family", key)):
         if before.get(key) != after.get(key):
             raise DatasetError(

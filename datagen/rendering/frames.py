@@ -1,4 +1,4 @@
-"""A Scene to arrays: both views' pictures and exact ground truth, frame by frame."""
+"""From a Scene to arrays: both views' pictures and exact ground truth, frame by frame."""
 
 from __future__ import annotations
 
@@ -29,34 +29,36 @@ LOG_LINES_SHOWN = 5
 
 @dataclass(frozen=True)
 class ViewTargets:
-    """One view's pictures and ground truth, as they are stored."""
+    """The pictures and the ground truth of one view of one frame, as they are stored."""
 
     images: dict[str, NDArray[np.uint8]]
-    """(H, W, 3) sRGB of each pass, by its name."""
+    """(H, W, 3) sRGB of each render pass, by its name."""
     disparity: NDArray[np.float32]
     """(H, W) px."""
     gradient: NDArray[np.float32]
     """(H, W, 2) forward differences [dx, dy] of the disparity."""
     gradient_valid: NDArray[np.bool_]
-    """(H, W)."""
+    """(H, W) True where the gradient exists and is no discontinuity."""
     occlusion: NDArray[np.uint8]
     """(H, W) 0 visible, 1 occluded, 2 out of the other frame."""
     object_index: NDArray[np.uint16]
     """(H, W) 0 where nothing is hit, else 1 + the index in `Scene.objects`."""
     extra: dict[tuple[str, Direction | None], NDArray[Any]]
-    """The targets asked for besides, by kind and direction."""
+    """The targets asked for besides, by kind and direction of time."""
 
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """How a Scene becomes arrays."""
+    """How a Scene is turned into arrays."""
 
     samples: int = 4
-    """Paths a pixel; ground truth is exact whatever this is."""
+    """Paths per pixel. Ground truth is exact whatever this is."""
     device: str = "cpu"
+    """What Cycles computes on: cpu, cuda, optix, hip or metal."""
     threads: int = 1
+    """CPU threads that Blender may use."""
     gradient_threshold_px: float = 1.0
-    """Larger forward differences are discontinuities: invalid as gradient targets."""
+    """Larger forward differences are discontinuities and invalid as gradient targets."""
     targets: tuple[str, ...] = ()
     """Which of `EXTRA_TARGETS` to make."""
     passes: tuple[str, ...] = ("clean",)
@@ -65,12 +67,13 @@ class RenderOptions:
 
 @dataclass
 class Stopwatch:
-    """Wall seconds by step."""
+    """Measures the wall time of steps, in seconds by the step's name."""
 
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
     def step(self, name: str) -> Iterator[None]:
+        """Add the time spent in the `with` block to the step's."""
         start = time.perf_counter()
         try:
             yield
@@ -79,7 +82,7 @@ class Stopwatch:
 
 
 class BlenderError(UserError):
-    """Blender could not render a scene; the message carries the end of its log."""
+    """Blender could not render a scene. The message ends with the end of its log."""
 
 
 def render_frames(
@@ -89,11 +92,20 @@ def render_frames(
     watch: Stopwatch | None = None,
     caster: SceneRayCaster | None = None,
 ) -> Generator[tuple[int, dict[View, ViewTargets]], None, None]:
-    """Yield (frame, both views' arrays) for every frame of a scene, frames counted from 0.
+    """Render a scene; yield (frame, both views' arrays) for every frame, frames counted from 0.
 
-    scratch: an existing folder for Blender's temporary files and, outside worker processes, its log.
-    caster: at the scene's meshes, if they have been built already. Blender keeps one world a process, so one
-    iterator at a time. Raises BlenderError, and RuntimeError on a Python without bpy.
+    Blender keeps one world in a process, so use one of these iterators at a time.
+
+    Args:
+        scene: The world and its camera.
+        scratch: An existing folder for Blender's temporary files and, outside worker processes, its log.
+        options: Samples, device, passes and targets.
+        watch: Where the time of each step is added up.
+        caster: A ray caster of this scene, if there is one already.
+
+    Raises:
+        BlenderError: If Blender fails.
+        ImportError: On a Python without bpy.
     """
     # Imported here so that planning, verifying and training work on a Python without Blender.
     from datagen.blender.build import build_world
@@ -114,7 +126,7 @@ def render_frames(
         for frame in range(scene.frames):
             with watch.step("render"), quiet(log):
                 radiances = {view: render_view(world, view, frame, scratch) for view in VIEWS}
-            if exposure is None:  # One exposure a scene: a camera does not flicker.
+            if exposure is None:  # One exposure for a scene: a camera does not flicker.
                 exposure = automatic_exposure(radiances["left"], scene.exposure_key)
             images = {view: {"clean": develop(radiance, exposure)} for view, radiance in radiances.items()}
             if "final" in options.passes:

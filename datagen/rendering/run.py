@@ -1,4 +1,4 @@
-"""Rendering a data set: which scenes are missing, workers to make them, and what came of it."""
+"""Rendering a data set: finding the missing scenes, giving them to workers and taking in the outcomes."""
 
 from __future__ import annotations
 
@@ -30,10 +30,11 @@ from stereoforge_kit.files import LocalTree, Tree, open_tree
 from stereoforge_kit.processes import Limits, available_memory_bytes
 
 SCENE_TIMEOUT_S = 1800.0
+"""How long one scene may take by default."""
 MEMORY_SHARE = 0.8
-"""Of the machine's memory, for all workers together."""
+"""Share of the machine's memory that all workers together may use."""
 NO_ROOM_BYTES = 16 << 20
-"""A failure with less room than this is the disk's: Blender does not say so itself."""
+"""With less room than this a failure is put down to the full disk: Blender does not say so itself."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +44,11 @@ class RenderSummary:
     recipe: Recipe
     """The folder's recipe after the run."""
     rendered: int
+    """Scenes that this run rendered."""
     already_there: int
+    """Scenes asked for that were finished before."""
     failures: tuple[QuarantinedScene, ...]
-    """Every scene asked for that is in quarantine now, from this run or an earlier one."""
+    """The scenes asked for that are in quarantine now, from this run or an earlier one."""
 
 
 def render_dataset(
@@ -59,19 +62,25 @@ def render_dataset(
     only: Collection[SceneKey] | None = None,
     on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
 ) -> RenderSummary:
-    """Render what is missing of a recipe under `root`; running it again finishes or extends the data set.
+    """Render the missing scenes of a recipe under `root`. Running it again finishes or extends the data set.
 
-    A scene that crashes, hangs, exceeds its memory or raises an error goes to quarantine with its record and
-    log, the others go on; later runs leave it alone unless it is named in `only`.
+    A scene that crashes, hangs, exceeds its memory or raises an error goes to quarantine with its record and log,
+    and the others go on. Later runs leave it alone unless it is named in `only`.
 
-    root: a folder, or a URL that fsspec knows, such as s3://bucket/folder. workers: processes, default one a
-    core or one a GPU. shard: (i, n) renders only every n-th scene from the i-th, so that n machines can share
-    a folder. only: render these (split, number) if they are missing, and nothing else. on_scene: called with
-    (done, total, manifest or None if it failed).
+    Args:
+        recipe: What to render. Its disparity histogram is fitted first if need be (`fit_disparities`).
+        root: A folder, or a URL that fsspec knows, such as s3://bucket/folder.
+        workers: Worker processes; None for one per core or one per GPU.
+        device: What Cycles computes on: cpu, cuda, optix, hip or metal.
+        shard: (i, n) renders only every n-th scene from the i-th, so that n machines can share a folder.
+        executor: Where scenes are rendered; None for worker processes on this machine.
+        only: Render these (split, number) if they are missing, and nothing else.
+        on_scene: Called after each scene with (scenes done, scenes in all, the manifest or None if it failed).
 
-    Raises DatasetError if the folder holds something else: other files, or a data set of other settings; before
-    anything is written if this machine has no such device, or scenes cannot have the disparities asked for; and
-    DiskFullError, with the data set as whole as it is, when there is no room for more.
+    Raises:
+        DatasetError: If the folder has other files or a data set of other settings, if this machine has no such
+            device, or if scenes cannot have the disparities asked for. Nothing has been written then.
+        DiskFullError: If there is no room for more. The finished scenes are whole.
     """
     tree = open_tree(root)
     if isinstance(tree, LocalTree) and tree.root.exists() and not tree.root.is_dir():
@@ -104,9 +113,13 @@ def local_executor(
     timeout_s: float = SCENE_TIMEOUT_S,
     memory_bytes: int | None = None,
 ) -> LocalExecutor:
-    """Worker processes of this machine: one a core or one a GPU, which together fit into its memory.
+    """Worker processes on this machine that together fit into its memory.
 
-    timeout_s, memory_bytes: what one scene may use, and the memory by default its worker's share.
+    Args:
+        workers: How many; None for one per core or one per GPU.
+        device: What Cycles computes on.
+        timeout_s: How long one scene may take.
+        memory_bytes: How much memory one scene may use; None for its worker's share.
     """
     cores = len(os.sched_getaffinity(0))
     gpus = find_gpus(device, os.environ)
@@ -122,9 +135,14 @@ def ray_executor(
     timeout_s: float = SCENE_TIMEOUT_S,
     memory_bytes: int | None = None,
 ) -> RayExecutor:
-    """Workers of a Ray cluster: one a CPU, or one a GPU.
+    """Workers of a Ray cluster: one per CPU, or one per GPU.
 
-    memory_bytes: what one scene may use; no limit by default, since the machines of a cluster differ.
+    Args:
+        address: The cluster's address; None for a cluster of this machine alone.
+        workers: At most so many; None for all that the cluster has room for.
+        device: What Cycles computes on.
+        timeout_s: How long one scene may take.
+        memory_bytes: How much memory one scene may use; None for no limit, since the machines of a cluster differ.
     """
     policy = WorkerPolicy(Limits(timeout_s, memory_bytes))
     return RayExecutor(address, workers, gpus_per_job=0.0 if device == "cpu" else 1.0, policy=policy)
@@ -132,7 +150,7 @@ def ray_executor(
 
 @dataclass
 class _Run:
-    """The outcomes of a run as they come: counted, logged, quarantined."""
+    """Takes in the outcomes of a run as they come: counts, logs and quarantines them."""
 
     tree: Tree
     area: StagingArea
@@ -214,7 +232,7 @@ class _Run:
 def _check_possible(
     recipe: Recipe, device: str, executor: Executor, tree: Tree, wanted: Sequence[SceneKey]
 ) -> None:
-    """Raise DatasetError for what no scene would be rendered with, instead of putting all of them in quarantine."""
+    """Raise DatasetError for what would make every scene fail, instead of putting all of them in quarantine."""
     asks = device != "cpu" or recipe.curation.disparity_px is not None
     if not asks or not set(wanted) - committed_scenes(tree):  # to list a large store takes a while
         return
@@ -224,7 +242,7 @@ def _check_possible(
 
 
 def _merge(tree: Tree, recipe: Recipe) -> Recipe:
-    """The recipe of a new place, or the one that is there with what `recipe` adds. Changes nothing."""
+    """The recipe that the folder will have: the one that is there, if any, with the scenes that `recipe` adds."""
     name = Layout(Path()).recipe.name
     if tree.exists(name):
         existing = recipe_from_text(tree.read(name), f"{tree.name}/{name}")
@@ -251,7 +269,7 @@ def _check_store(tree: Tree, recipe: Recipe) -> None:
 
 
 def _write_recipe(tree: Tree, area: StagingArea, recipe: Recipe) -> None:
-    """By way of the staging area, so that a run killed meanwhile leaves no temporary file."""
+    """Write the recipe by way of the staging area, so that a killed run leaves no temporary file."""
     staged = Layout(area.folder).recipe
     write_recipe(staged, recipe)
     if not tree.exists(staged.name) or tree.read(staged.name) != staged.read_bytes():
@@ -259,7 +277,7 @@ def _write_recipe(tree: Tree, area: StagingArea, recipe: Recipe) -> None:
 
 
 def committed_scenes(tree: Tree) -> set[SceneKey]:
-    """Every scene that is whole."""
+    """(split, number) of every finished scene."""
     folders = {split: Layout(Path()).manifest(split, 0).parent.as_posix() for split in SPLITS}
     return {
         (split, scene) for split, folder in folders.items() for scene in scene_numbers(tree.files_in(folder))

@@ -1,4 +1,4 @@
-"""One scene from recipe to committed files: what a worker process does."""
+"""The job of a worker process: one scene, from the recipe to committed files."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ from stereoforge_kit.files import LocalTree, Tree, write_text
 
 @dataclass(frozen=True)
 class SceneJob:
-    """One scene to render, and with what."""
+    """One scene to render, and what it needs."""
 
     tree: Tree
-    """Where the data set is."""
+    """The folder or URL of the data set."""
     area: StagingArea
-    """Where the scene is made."""
+    """Where the scene is staged before it is committed."""
     recipe: Recipe
     split: str
     scene: int
@@ -53,14 +53,15 @@ class SceneJob:
 
     @property
     def name(self) -> str:
+        """Split and number, for example `train/0003`."""
         return f"{self.split}/{self.scene:04d}"
 
 
 def render_scene(job: SceneJob) -> SceneManifest:
-    """Render, measure and commit one scene.
+    """Render, measure and commit one scene; return its manifest.
 
-    Everything is written to a staging folder first and moved into place at the end, the manifest last, so
-    that a scene with a manifest is whole whatever happens.
+    Everything is written to a staging folder first and moved into place at the end, the manifest last. So a scene
+    with a manifest is whole, whatever happens. Raises DatasetError if every attempt at the scene is degenerate.
     """
     with job.area.scene_folder(job.split, job.scene) as staging:
         watch = Stopwatch()
@@ -69,7 +70,7 @@ def render_scene(job: SceneJob) -> SceneManifest:
 
 
 def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, Any]:
-    """Stage the first attempt at the scene that is not degenerate, all files but its manifest; its statistics."""
+    """Stage all files but the manifest of the first attempt that is not degenerate; return its statistics."""
     if isinstance(job.tree, LocalTree):
         use_store(Layout(job.tree.root).assets)
     rejected: Counter[str] = Counter()
@@ -93,7 +94,7 @@ def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, 
 def _render_attempt(
     job: SceneJob, staging: Path, caster: SceneRayCaster, watch: Stopwatch
 ) -> list[dict[str, float]] | None:
-    """Render and stage a scene; its frames' statistics, or None if its first picture is textureless."""
+    """Render and stage a scene; return its frames' statistics, or None if the first picture is textureless."""
     recipe, staged, scene = job.recipe, Layout(staging), caster.geometry.scene
     options = RenderOptions(
         recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets, recipe.passes
@@ -160,7 +161,7 @@ def _frame_statistics(left: ViewTargets) -> dict[str, float]:
 
 
 def _scene_statistics(scene: Scene, frames: list[dict[str, float]], rejected: Counter[str]) -> dict[str, Any]:
-    """Counts, the means over the frames of what was measured in the left view, and what was rejected why."""
+    """Counts, means over the frames of what was measured in the left view, and the reasons of rejections."""
     means = {key: round(float(np.mean([frame[key] for frame in frames])), 5) for key in frames[0]}
     return {"objects": len(scene.objects), "frames": scene.frames, **means, "rejected": dict(rejected)}
 
@@ -178,7 +179,7 @@ def _assets_used(recipe: Recipe, scene: Scene) -> list[str]:
 
 
 def _commit(job: SceneJob, staging: Path, watch: Stopwatch, statistics: dict[str, Any]) -> SceneManifest:
-    """Move the staged scene into the data set and make it exist by putting its manifest there."""
+    """Move the staged scene into the data set, its manifest last."""
     files = sorted(path for path in staging.rglob("*") if path.is_file())
     manifest = _manifest(job, staging, files, watch, statistics)
     staged_manifest = Layout(staging).manifest(job.split, job.scene)
@@ -214,6 +215,6 @@ def _manifest(
 
 
 def _unit(path: Path, root: Path) -> Path:
-    """What is moved as a whole for a staged file: a scene's folder, or the scene's single record."""
+    """What is moved as a whole with a staged file: the folder that it is in, or the scene's single record."""
     kind, split, group, scene, *_ = path.relative_to(root).parts
     return root / kind / split / group / scene

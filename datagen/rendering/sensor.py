@@ -1,4 +1,4 @@
-"""What the camera itself adds to a final picture: vignetting, unequal cameras, photon noise. Pure numpy."""
+"""The sensor of the final pass: vignetting, unequal exposure and colour of the two cameras, photon noise."""
 
 from __future__ import annotations
 
@@ -27,7 +27,14 @@ class Sensor:
     def expose(
         self, radiance: NDArray[np.float32], exposure: float, view: View, frame: int
     ) -> NDArray[np.float32]:
-        """(H, W, 3) light on the sensor, 1 is full white, of linear radiance and the scene's exposure."""
+        """(H, W, 3) float32 light on the sensor, 1 being white.
+
+        Args:
+            radiance: (H, W, 3) linear RGB.
+            exposure: The scene's factor from radiance to light.
+            view: "left" or "right".
+            frame: The frame's number from 0, which seeds the noise.
+        """
         light = radiance * np.float32(exposure) * vignette(self._final, *radiance.shape[:2])[..., None]
         if view == "right":
             light = light * np.float32(2.0**self._final.exposure_difference_ev)
@@ -41,7 +48,7 @@ class Sensor:
 
 
 def vignette(final: FinalPass, height: int, width: int) -> NDArray[np.float32]:
-    """(H, W) share of the light that is left: falls with the square of the distance from the centre."""
+    """(H, W) float32 share of the light that vignetting leaves; it falls with the squared distance from the centre."""
     x = (np.arange(width) + 0.5) / width * 2 - 1
     y = ((np.arange(height) + 0.5) / height * 2 - 1)[:, None]
     aspect = height / width
