@@ -1,8 +1,8 @@
 """Choosing the baseline so that a scene has the disparities asked for.
 
-Streets and landscapes reach from the camera's feet to the horizon. Their depths are
-given. But the left view does not depend on the baseline, and every disparity is proportional to it, so the disparities of
-one baseline tell the baseline for others.
+In streets and landscapes, which reach from the camera's feet to the horizon, the depths are given. But the left view
+does not depend on the baseline and every disparity is proportional to it, so the disparities with one baseline give
+those with any other.
 """
 
 from __future__ import annotations
