@@ -1,4 +1,4 @@
-"""A Scene record to Blender objects."""
+"""Building a Scene record as objects of the open Blender file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from scenes.user_assets.pool import UserEnvironment
 
 @dataclass(frozen=True)
 class BuiltWorld:
-    """A Scene standing in the open Blender file."""
+    """A Scene that is built in the open Blender file."""
 
     scene: Scene
     geometry: SceneGeometry
@@ -35,7 +35,7 @@ class BuiltWorld:
 def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> BuiltWorld:
     """Build everything in the geometry's scene into an empty Blender file."""
     scene = geometry.scene
-    # Families draw some materials that no object happens to wear: painting those would be for nothing.
+    # Families sample some materials that no object has: painting those would be for nothing.
     worn = sorted({thing.material for thing in scene.objects})
     materials = {k: build_material(f"material_{k}", scene.materials[k]) for k in worn}
     objects = _build_objects(geometry, materials, blender_scene)
@@ -47,7 +47,7 @@ def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> Buil
 
 
 def place(world: BuiltWorld, view: str, time_frames: float) -> None:
-    """Put every object, and the camera for one view, where they are at an instant, deformed as they are then."""
+    """Place every object, deformed, and the camera of one view as they are at an instant."""
     for index, (thing, block) in enumerate(zip(world.scene.objects, world.objects, strict=True)):
         if len(thing.motion.times_frames) > 1:
             block.matrix_world = Matrix(thing.pose(time_frames).tolist())
@@ -62,7 +62,7 @@ def place(world: BuiltWorld, view: str, time_frames: float) -> None:
 def _build_objects(
     geometry: SceneGeometry, materials: Mapping[int, bpy.types.Material], blender_scene: bpy.types.Scene
 ) -> tuple[bpy.types.Object, ...]:
-    """One Blender object each; rigid ones of the same shape and material are instances of one mesh."""
+    """One Blender object for each of the scene's. Rigid ones of the same shape and material share one mesh."""
     shared: dict[tuple[int, int], bpy.types.Mesh] = {}
     objects = []
     for index, thing in enumerate(geometry.scene.objects):

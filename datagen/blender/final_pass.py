@@ -1,7 +1,7 @@
 """The final pass: Cycles with the shutter open, a real lens and fog in every shader.
 
-Everything is put in place for one picture and taken away after it, so that clean pictures and ground truth
-come from the same untouched world whether a final pass is rendered or not.
+Everything is set up for one picture and removed after it. So clean pictures and ground truth come from the same world,
+whether a final pass is rendered or not.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from datagen.dataset.layout import VIEWS, View
 from scenes.spec import FinalPass, Fog
 
 SHUTTER_FRAME = 10
-"""The frame of Blender's clock on which the shutter interval is centred, whatever instant it shows."""
+"""The frame of Blender's clock on which the shutter interval is centred, whichever instant it shows."""
 HAZE_HEIGHT = 0.2
 """Height of the layer of haze before the sky, in visibilities: the zenith keeps exp(-0.2) of its light."""
 _FINAL_SEED = 1 << 20
@@ -31,9 +31,13 @@ _FINAL_SEED = 1 << 20
 def render_final(
     world: BuiltWorld, frame: int, exposure: float, scratch: Path
 ) -> dict[View, NDArray[np.float32]]:
-    """(H, W, 3) scene-linear RGB of each view with motion blur, defocus and fog.
+    """(H, W, 3) float32 scene-linear RGB of each view with motion blur, defocus and fog.
 
-    exposure: The factor the pictures will be exposed with, which the fog's colour is given after.
+    Args:
+        world: The world to render.
+        frame: The frame's number from 0, in the middle of the shutter interval.
+        exposure: The factor that the pictures will be exposed with. The fog's colour is that of the exposed picture.
+        scratch: An existing folder for Blender's temporary file.
     """
     final = world.scene.final
     with ExitStack() as stack:
@@ -66,9 +70,9 @@ def _lens(world: BuiltWorld, final: FinalPass) -> Iterator[None]:
 
 @contextmanager
 def _open_shutter(world: BuiltWorld, view: str, frame: int, shutter_frames: float) -> Iterator[None]:
-    """Key frames of everything that moves at the shutter's opening, middle and closing.
+    """Give everything that moves key frames at the shutter's opening, middle and closing.
 
-    Cycles takes the motion at those three instants and goes straight between them.
+    Cycles takes the motion at these three instants and interpolates linearly between them.
     """
     half = shutter_frames / 2
     keys = [(SHUTTER_FRAME + offset, frame + offset) for offset in (-half, 0.0, half)]
@@ -114,7 +118,7 @@ def _key_poses(block: bpy.types.Object, poses: list[NDArray[np.float64]], clocks
 
 
 def _key_shapes(block: bpy.types.Object, shapes: list[NDArray[np.float64]], clocks: list[float]) -> None:
-    """The middle shape as the basis, and the other two coming and going."""
+    """Shape keys: the middle shape is the basis, and the other two are blended in and out."""
     opening, middle, closing = shapes
     block.shape_key_add(name="middle").data.foreach_set("co", middle.astype(np.float32).ravel())
     for shape, clock in ((opening, clocks[0]), (closing, clocks[2])):
@@ -127,10 +131,10 @@ def _key_shapes(block: bpy.types.Object, shapes: list[NDArray[np.float64]], cloc
 
 @contextmanager
 def _foggy(world: BuiltWorld, fog: Fog, exposure: float) -> Iterator[None]:
-    """Mix what the camera sees with the fog's colour by its distance, in the shaders themselves.
+    """Mix every surface with the fog's colour by its distance, in the shaders themselves and for camera rays only.
 
-    So each path through lens and shutter gets the fog of its own length, nothing needs to be composited, and
-    light is not dimmed on its way to the surfaces.
+    So each path through lens and shutter gets the fog of its own length, no compositing is needed, and light is not
+    dimmed on its way to the surfaces.
     """
     trees = [(block.node_tree, False) for block in bpy.data.materials if block.use_nodes]
     trees.append((world.blender_scene.world.node_tree, True))
@@ -148,7 +152,7 @@ _FogNodes = tuple[list[bpy.types.Node], bpy.types.NodeSocket, bpy.types.NodeSock
 
 
 def _add_fog(tree: bpy.types.NodeTree, fog: Fog, exposure: float, sky: bool) -> _FogNodes:
-    """Put fog before a shader; what was added, and the link it replaced."""
+    """Insert fog behind a shader; return the nodes added and the link that they replace."""
     (output,) = (
         node.inputs["Surface"] for node in tree.nodes if node.type in ("OUTPUT_MATERIAL", "OUTPUT_WORLD")
     )

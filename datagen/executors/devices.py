@@ -1,4 +1,4 @@
-"""Which graphics processor each worker may see: one worker a GPU, and each GPU its own."""
+"""Which GPU each worker may see: by default one worker for each GPU."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ VISIBLE_DEVICES = {
     "optix": "CUDA_VISIBLE_DEVICES",
     "hip": "HIP_VISIBLE_DEVICES",
 }
-"""The variable that tells a process which GPUs there are, by Cycles' name for the device."""
+"""The environment variable that limits the GPUs a process sees, by Cycles' name for the device."""
 _KFD_NODES = Path("/sys/class/kfd/kfd/topology/nodes")
 
 
 def assign_devices(
     device: str, gpus: Sequence[str], workers: int | None = None
 ) -> tuple[Mapping[str, str], ...]:
-    """Environment variables of each worker, one worker a GPU unless told how many; they take turns then.
+    """The environment variables of each worker.
 
-    gpus: the names of the GPUs as the variable in `VISIBLE_DEVICES` takes them, such as "0" or a UUID. Devices that
-    cannot be told apart by a variable (the CPU, Apple's) and machines that name none give empty mappings.
+    Args:
+        device: What Cycles computes on. Devices that no variable tells apart (the CPU, Apple's) give empty mappings.
+        gpus: The names of the GPUs as the variable in `VISIBLE_DEVICES` takes them, such as "0" or a UUID.
+        workers: How many workers, which are spread over the GPUs evenly; None for one per GPU.
     """
     if device not in VISIBLE_DEVICES or not gpus:
         return ({},) * (workers or 1)
@@ -30,7 +32,7 @@ def assign_devices(
 
 
 def find_gpus(device: str, environment: Mapping[str, str]) -> list[str]:
-    """The GPUs this process may use: those its own variable names, or all that the driver lists."""
+    """The GPUs that this process may use: those that its environment names, or all that the driver lists."""
     if device not in VISIBLE_DEVICES:
         return []
     named = environment.get(VISIBLE_DEVICES[device])

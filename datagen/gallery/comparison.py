@@ -1,4 +1,4 @@
-"""Two data sets' statistics side by side: the start of any study of the gap between two domains."""
+"""Comparing the statistics of two data sets: the start of a domain-gap study."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from stereoforge_kit.viewing import Picture, render_page, shrunk
 from stereoforge_kit.viewing.plots import svg
 
 SHOWN_FRAMES = 6
-"""Pictures of each set."""
+"""Number of pictures of each set."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class _ComparedSet:
     """One of the two sets."""
 
     name: str
-    """The folder's name, made unlike the other's."""
+    """The folder's name, with as much of its path as makes it differ from the other's."""
     lead: str
     samples: list[StereoSample]
     pictures: list[Picture]
@@ -53,12 +53,12 @@ def write_comparison(
     scenes: int = SHOWN_FRAMES,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Write one page with the statistics of two data sets, all their splits together, side by side.
+    """Write a page that compares the statistics of two data sets, with all their splits together.
 
     Args:
         first, second: The data sets' folders.
-        out_html: The file to write; it needs nothing beside it.
-        scenes: At most so many pictures of each set, and not more than `SHOWN_FRAMES`.
+        out_html: The file to write. It needs no other file and opens from disk.
+        scenes: Number of pictures of each set, at most `SHOWN_FRAMES`.
         progress: Called with (frames read, frames in all).
 
     Raises:
@@ -84,7 +84,7 @@ def write_comparison(
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
-    """The folders' names, with as much of their parents' as tells them apart."""
+    """The folders' names, with as much of their paths as tells them apart."""
     one, two = first.resolve().parts, second.resolve().parts
     for length in range(1, max(len(one), len(two)) + 1):
         names = "/".join(one[-length:]), "/".join(two[-length:])
@@ -106,7 +106,7 @@ def _compared_set(root: Path, name: str, shown: int) -> _ComparedSet:
 
 
 def _rows(first: SetStatistics, second: SetStatistics) -> list[_Row]:
-    """Median and spread of every quantity in both, and how far apart the distributions are."""
+    """Median and spread of every quantity in both sets, and the distance of the two distributions."""
     quantities = (
         ("Disparity of a pixel, px", "disparity", 1.0, 1),
         ("Occluded pixels, %", "occluded", 100.0, 1),

@@ -91,7 +91,9 @@ class Recipe:
         if self.curriculum_scenes < 0:
             raise DatasetError(f"curriculum_scenes must not be negative, got {self.curriculum_scenes}")
         if self.assets and not FAMILIES[self.family].takes_assets:
-            raise DatasetError(f"worlds of {self.family} take no meshes, textures or environments of yours")
+            raise DatasetError(
+                f"worlds of {self.family} take no user assets (meshes, textures, environments)"
+            )
         try:
             self.world.at_complexity(0.0 if self.curriculum_scenes else 1.0)
             if self.curation.disparity_px:

@@ -144,7 +144,7 @@ def render_frames(
             yield frame, targets
     except RuntimeError as error:
         tail = " | ".join(log.read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:])
-        raise BlenderError(f"{error}; Blender's last words: {tail}" if tail else str(error)) from error
+        raise BlenderError(f"{error}; the end of Blender's log: {tail}" if tail else str(error)) from error
 
 
 def _targets(

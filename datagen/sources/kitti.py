@@ -1,8 +1,8 @@
 """KITTI 2012 and 2015 (Geiger et al., CVPR 2012; Menze and Geiger, CVPR 2015): sparse ground truth.
 
-Disparity of the left view as 16-bit PNG, d = value / 256, 0 where there is none. `occ` holds all points, `noc` those
-the right view shows. What 2015 calls `disp_occ_1` is the left view's disparity one frame later, not the
-right view's, so there is no right disparity here. The frames with ground truth are those of the training part.
+The frames with ground truth are those of the training part. The disparity of the left view is a 16-bit PNG file with
+d = value / 256, 0 where there is none. `occ` has all points, `noc` those that are visible in the right view. What 2015
+calls `disp_occ_1` is the left view's disparity one frame later, not the right view's, so there is no right disparity.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ UNITS_PER_PX = 256
 
 @dataclass(frozen=True)
 class _Edition:
-    """The folders of one edition."""
+    """The folders of one edition; `objects` is None if it has no object maps."""
 
     left: str
     right: str
@@ -50,7 +50,10 @@ _REFERENCE_FRAMES = "*_10.png"
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a KITTI disparity, NaN where there is none. Raises FormatError."""
+    """Read a KITTI disparity: (H, W) float32 px, NaN where there is none.
+
+    Raises FormatError for a file that is none.
+    """
     values = read_png(path)
     if values.dtype != np.uint16 or values.ndim != 2:
         raise FormatError(
@@ -72,7 +75,7 @@ def read_labels(all_points: Path, visible_points: Path) -> NDArray[np.uint8]:
 
 
 def read_objects(path: Path) -> NDArray[np.uint16]:
-    """0 background, else a number a car. Raises FormatError."""
+    """Read an object map: (H, W) uint16, 0 background, else the number of a car. Raises FormatError."""
     return read_png(path).astype(np.uint16)
 
 

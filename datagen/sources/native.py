@@ -1,4 +1,4 @@
-"""Our own data sets (docs/conventions.md): nothing is derived."""
+"""StereoForge's own data sets (docs/conventions.md). Nothing is derived: they have all ground truth."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from datagen.dataset.layout import SPLITS
+from datagen.dataset.layout import SPLITS, Layout
 from datagen.dataset.samples import StereoDataset, StereoSample, open_layout
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import StereoFrame
@@ -14,7 +14,7 @@ from datagen.sources.webdataset import INDEX_NAME
 
 
 def _recognises(root: Path) -> bool:
-    return (root / "recipe.yaml").is_file() and not (root / INDEX_NAME).is_file()  # Shards have a recipe too.
+    return Layout(root).recipe.is_file() and not (root / INDEX_NAME).is_file()  # Shards have a recipe too.
 
 
 def _find_frames(location: str, split: str, render_pass: str) -> Sequence[StereoFrame]:
@@ -26,11 +26,11 @@ def _find_frames(location: str, split: str, render_pass: str) -> Sequence[Stereo
 
 FORMATS = (
     SourceFormat(
-        "native", "a data set of ours", _recognises, partial(_find_frames, render_pass="clean"), SPLITS
+        "native", "a StereoForge data set", _recognises, partial(_find_frames, render_pass="clean"), SPLITS
     ),
     SourceFormat(
         "native-final",
-        "a data set of ours (final pass)",
+        "a StereoForge data set (final pass)",
         lambda _: False,
         partial(_find_frames, render_pass="final"),
         SPLITS,

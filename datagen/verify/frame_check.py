@@ -1,4 +1,4 @@
-"""All checks of one frame whose files are as they were written: its arrays, and the scene they show."""
+"""All checks of one frame whose files are intact: of its arrays, and of the scene that they show."""
 
 from __future__ import annotations
 
@@ -27,24 +27,29 @@ from datagen.verify.checks import (
 from scenes import Scene
 
 NORMAL_TOLERANCE = 1e-4
+"""How far a component of a unit normal may be from the scene's geometry."""
 MOTION_TOLERANCE_PX = 1e-2
-"""Of flow and disparity change, and relative where they are above 1 px."""
+"""How far flow and disparity change may be from the scene's geometry, relative where they are above 1 px."""
 
 
 @dataclass(frozen=True)
 class FrameCheck:
-    """One frame, in every pass that was rendered, and what it is compared with."""
+    """One frame, in every pass that was rendered, and what it is checked against."""
 
     samples: tuple[StereoSample, ...]
     """The same frame in each pass."""
     recipe: Recipe
     scene: Scene
     caster: SceneRayCaster | None
-    """None to leave the geometry out."""
+    """None to leave out the geometry."""
     sampled_pixels: int
+    """Number of pixels of each view that are compared with the geometry."""
 
     def problems(self) -> Iterator[tuple[Path, str]]:
-        """Yield (file, sentence). Raises DatasetError for a file that does not decode or fit the others."""
+        """Yield (file, sentence) for each problem.
+
+        Raises DatasetError for a file that does not decode or does not fit the others.
+        """
         size = (self.scene.camera.height, self.scene.camera.width)
         sample = self.samples[0]
         if sample.size != size:
@@ -56,7 +61,7 @@ class FrameCheck:
             for view in VIEWS
             for message in check_disparity(sample.view(view).disparity)
         ]
-        if unusable:  # Whatever else is wrong then follows from that.
+        if unusable:  # Other problems would only follow from this one.
             yield from unusable
             return
         for view in VIEWS:

@@ -1,4 +1,4 @@
-"""Rendering again what `verify` found broken, and nothing else."""
+"""Rendering again the scenes that `verify` found broken, and nothing else."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from datagen.verify.report import Problem
 
 
 def broken_scenes(problems: Iterable[Problem]) -> list[SceneKey]:
-    """(split, scene) of every finished scene that a problem lies in, in order."""
+    """(split, number) of every finished scene with a problem, in order."""
     found = {
         (item.split, item.scene) for item in problems if item.split is not None and item.scene is not None
     }
@@ -25,7 +25,7 @@ def broken_scenes(problems: Iterable[Problem]) -> list[SceneKey]:
 
 
 def problems_left(problems: Iterable[Problem], repaired: list[SceneKey]) -> list[Problem]:
-    """Those that lie in no finished scene, without the files that a repaired scene has replaced or taken in."""
+    """The problems of no finished scene, without those of files that a repaired scene has replaced or listed."""
     paths = [PurePosixPath(path) for scene in repaired for path in Layout(Path()).scene_paths(*scene)]
     return [
         problem
@@ -42,16 +42,25 @@ def repair_dataset(
     executor: Executor | None = None,
     on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
 ) -> RenderSummary:
-    """Remove finished scenes and render them again; interrupted, any later render of the set does the rest.
+    """Remove broken scenes and render them again.
 
-    Raises DatasetError as `render_dataset` does.
+    If this is interrupted, the next render of the data set does the rest.
+
+    Args:
+        root: The data set's folder, or a URL.
+        broken: (split, number) of the scenes.
+        executor: Where scenes are rendered; None for worker processes on this machine.
+        on_scene: Called after each scene with (scenes done, scenes in all, the manifest or None if it failed).
+
+    Raises:
+        DatasetError: As `render_dataset` does.
     """
     layout = open_layout(root)
     recipe = read_recipe(layout.recipe)
     for split, scene in broken:
         layout.tree.remove(Layout(Path()).manifest(split, scene).as_posix())
         discard_uncommitted(layout.tree, split, scene)
-    # A scene beyond the recipe's numbers has no way to be rendered again: it was never asked for.
+    # A scene beyond the recipe's numbers is not rendered again: the recipe does not ask for it.
     splits = {split for split, _ in broken}
     asked = replace(recipe, scenes={split: recipe.scenes.get(split, 0) for split in splits})
     return render_dataset(asked, root, executor=executor, only=broken, on_scene=on_scene)

@@ -244,9 +244,9 @@ def test_occlusion_against_disparity(own_dataset: Path) -> None:
     for changed, says in (
         (np.where(labels == 1, 0, labels), "sampled occlusion labels are not those of the scene"),
         (np.where(labels == 1, 0, 1), "visible pixels have another disparity than the other view"),
-        (np.where(labels == 2, 1, labels), "are labelled against where their disparity puts them"),
-        (np.where(labels == 0, 1, labels), "occluded pixels have nothing nearer before them"),
-        (labels[:, ::-1].copy(), "are labelled against where their disparity puts them"),
+        (np.where(labels == 2, 1, labels), "have a label that contradicts their place"),
+        (np.where(labels == 0, 1, labels), "occluded pixels have nothing nearer in front of them"),
+        (labels[:, ::-1].copy(), "have a label that contradicts their place"),
     ):
         write_occlusion(path, changed.astype(np.uint8))
         commit_again(own_dataset)
