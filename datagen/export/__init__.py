@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datagen.dataset.samples import StereoDataset
 from datagen.export.kitti import export_kitti
 from datagen.export.sceneflow import export_sceneflow
-from datagen.export.shards import export_webdataset
+from datagen.export.webdataset import export_webdataset
 from stereoforge_kit.files import Tree
 
 

@@ -108,7 +108,7 @@ class SceneRayCaster:
             weights[met] = np.stack(parts, -1) / np.sum(parts, axis=0)[:, None]
         return SurfacePoints(triangle, weights)
 
-    def sees_back(
+    def shows_back(
         self, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
         """(N,) True where a pixel of the left view shows the back of a triangle, whose corners run clockwise there."""

@@ -93,7 +93,7 @@ def _faults(caster: SceneRayCaster, curation: Curation, frame: int) -> Iterator[
     rows, columns = caster.coarse_pixels(RAYS_ACROSS)
     hits = caster.cast("left", frame, rows, columns)
     counts = np.bincount(hits.object_index, minlength=len(scene.objects) + 1) / len(rows)
-    from_behind = caster.sees_back(frame, rows, columns)
+    from_behind = caster.shows_back(frame, rows, columns)
     inner = np.bincount(hits.object_index[from_behind], minlength=len(counts)) / len(rows)
     if inner.max() > curation.max_inside:
         yield "camera inside an object"
