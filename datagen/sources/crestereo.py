@@ -2,7 +2,7 @@
 `*_left.disp.png`, `*_right.disp.png`.
 
 The disparities of both views are 16-bit PNG files with d = value / 32, valid everywhere. Occlusion is derived from
-both.
+both. Every frame is a scene of its own; the four folders are kinds of scenes.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ def _frames(root: Path) -> Iterator[FileFrame]:
         name = (truth.parent / stem).relative_to(root).as_posix()
         yield FileFrame(
             name=name,
+            scene_name=name,
             read_left=partial(read_picture, truth.with_name(f"{stem}_left.jpg")),
             read_right=partial(read_picture, truth.with_name(f"{stem}_right.jpg")),
             read_disparity_left=partial(read_disparity, truth),

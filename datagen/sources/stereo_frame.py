@@ -28,6 +28,14 @@ class StereoFrame(Protocol):
         """A name that is unique within the source."""
 
     @property
+    def scene_name(self) -> str:
+        """The scene of the source that the frame belongs to.
+
+        Frames of one scene show the same things at other moments, from other places or in other light. So they are not
+        independent samples.
+        """
+
+    @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
 
@@ -61,7 +69,14 @@ class StereoFrame(Protocol):
 
     @property
     def object_index_left(self) -> NDArray[np.uint16] | None:
-        """(H, W) 0 background, else the number of an object; None if the set has none."""
+        """(H, W) 0 where nothing is hit (sky), else the number of an object; None if the set has none."""
+
+    @property
+    def foreground_left(self) -> NDArray[np.uint16] | None:
+        """(H, W) 0 background, else the number of a foreground object, as in KITTI's object map, where those are cars.
+
+        None if the set does not tell foreground from background.
+        """
 
 
 @dataclass(frozen=True)
@@ -74,12 +89,14 @@ class FileFrame:
     """
 
     name: str
+    scene_name: str
     read_left: Callable[[], Picture]
     read_right: Callable[[], Picture]
     read_disparity_left: Callable[[], DisparityMap]
     read_disparity_right: Callable[[], DisparityMap] | None = None
     read_occlusion_left: Callable[[], NDArray[np.uint8]] | None = None
     read_object_index_left: Callable[[], NDArray[np.uint16]] | None = None
+    read_foreground_left: Callable[[], NDArray[np.uint16]] | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -130,10 +147,17 @@ class FileFrame:
 
     @cached_property
     def object_index_left(self) -> NDArray[np.uint16] | None:
-        """(H, W) 0 background, else the number of an object; None if the set has none."""
+        """(H, W) 0 where nothing is hit (sky), else the number of an object; None if the set has none."""
         if self.read_object_index_left is None:
             return None
         return self._checked("object index", self.read_object_index_left())
+
+    @cached_property
+    def foreground_left(self) -> NDArray[np.uint16] | None:
+        """(H, W) 0 background, else the number of a foreground object; None if the set does not tell."""
+        if self.read_foreground_left is None:
+            return None
+        return self._checked("foreground", self.read_foreground_left())
 
     @cached_property
     def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

@@ -181,6 +181,16 @@ def check_derived(values: NDArray[Any], expected: NDArray[Any], origin: str) -> 
         yield f"{wrong} pixels do not follow from {origin}"
 
 
+def check_boundaries(marked: NDArray[np.bool_], expected: NDArray[np.bool_]) -> Iterator[str]:
+    """Motion boundaries (H, W) agree with those of the scene's geometry at the pixels that either marks."""
+    either = marked | expected
+    yield from _too_many(
+        (marked != expected)[either],
+        MAX_OFF_LABELS,
+        "pixels of motion boundaries differ from the scene's geometry",
+    )
+
+
 def _in_other_view(
     view: View, disparity: NDArray[np.float32], other_disparity: NDArray[np.float32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]:

@@ -12,9 +12,16 @@ from numpy.typing import NDArray
 from datagen.dataset.layout import DIRECTIONS, FIRST_FRAME, RENDER_PASSES, VIEWS, Direction, View
 from datagen.dataset.samples import StereoSample
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.targets import PixelSurfaces, find_surfaces, material_index, motion_boundaries
+from datagen.ground_truth.targets import (
+    PixelSurfaces,
+    find_surfaces,
+    material_index,
+    motion_boundaries,
+    object_edges,
+)
 from datagen.recipe.recipe import Recipe
 from datagen.verify.checks import (
+    check_boundaries,
     check_derived,
     check_disparity,
     check_geometry,
@@ -105,38 +112,66 @@ class FrameCheck:
     def _check_extra_targets(self, view: View) -> Iterator[tuple[Path, str]]:
         """The targets that the recipe asks for besides the basic ones."""
         sample, kinds = self.samples[0], self.recipe.targets
-        if not kinds or self.caster is None:
-            return
         rows, columns = self._sampled(view)
-        instant = sample.frame - FIRST_FRAME
-        surfaces = find_surfaces(self.caster, view, instant, rows, columns)
+        surfaces = None
+        if self.caster is not None and not set(kinds) <= {"material_index", "motion_boundaries"}:
+            surfaces = find_surfaces(self.caster, view, sample.frame - FIRST_FRAME, rows, columns)
         if "material_index" in kinds:
-            worn = material_index(self.scene, sample.view(view).object_index)
-            for message in check_derived(sample.material_index(view), worn, "the objects' materials"):
-                yield self._file("material_index", view), message
+            stored, index = sample.material_index(view), sample.view(view).object_index
+            if index.max() <= len(self.scene.objects):  # Otherwise that is the problem and has been reported.
+                worn = material_index(self.scene, index)
+                for message in check_derived(stored, worn, "the objects' materials"):
+                    yield self._file("material_index", view), message
         if "normals" in kinds:
-            for message in check_vectors(
-                sample.normals(view)[rows, columns], surfaces.normals(), NORMAL_TOLERANCE
-            ):
-                yield self._file("normals", view), message
+            normals = sample.normals(view)[rows, columns]
+            if surfaces is not None:
+                for message in check_vectors(normals, surfaces.normals(), NORMAL_TOLERANCE):
+                    yield self._file("normals", view), message
         for direction in DIRECTIONS:
             yield from self._check_motion(view, direction, surfaces)
+        if "motion_boundaries" in kinds:
+            yield from self._check_boundaries(view)
 
     def _check_motion(
-        self, view: View, direction: Direction, surfaces: PixelSurfaces
+        self, view: View, direction: Direction, surfaces: PixelSurfaces | None
     ) -> Iterator[tuple[Path, str]]:
         sample, kinds = self.samples[0], self.recipe.targets
         rows, columns = self._sampled(view)
-        flow = sample.flow(view, direction) if "optical_flow" in kinds else None
-        if flow is not None:
-            for message in check_vectors(flow[rows, columns], surfaces.flow(direction), MOTION_TOLERANCE_PX):
-                yield self._file("optical_flow", view, direction), message
+        if "optical_flow" in kinds:
+            flow = sample.flow(view, direction)[rows, columns]
+            if surfaces is not None:
+                for message in check_vectors(flow, surfaces.flow(direction), MOTION_TOLERANCE_PX):
+                    yield self._file("optical_flow", view, direction), message
         if "disparity_change" in kinds:
             change = sample.disparity_change(view, direction)[rows, columns]
-            for message in check_vectors(change, surfaces.disparity_change(direction), MOTION_TOLERANCE_PX):
-                yield self._file("disparity_change", view, direction), message
-        if "motion_boundaries" in kinds and flow is not None:
+            if surfaces is not None:
+                for message in check_vectors(
+                    change, surfaces.disparity_change(direction), MOTION_TOLERANCE_PX
+                ):
+                    yield self._file("disparity_change", view, direction), message
+
+    def _check_boundaries(self, view: View) -> Iterator[tuple[Path, str]]:
+        """Motion boundaries follow from the stored flow, or from the geometry's flow if none is stored."""
+        sample, stored = self.samples[0], "optical_flow" in self.recipe.targets
+        index = sample.view(view).object_index
+        for direction in DIRECTIONS:
             marked = sample.motion_boundaries(view, direction)
-            expected = motion_boundaries(flow, sample.view(view).object_index)
-            for message in check_derived(marked, expected, "optical flow and object index"):
+            messages: Iterator[str] = iter(())
+            if stored:
+                expected = motion_boundaries(sample.flow(view, direction), index)
+                messages = check_derived(marked, expected, "optical flow and object index")
+            elif self.caster is not None:
+                flow = self._flow_at(self.caster, view, direction, object_edges(index))
+                messages = check_boundaries(marked, motion_boundaries(flow, index))
+            for message in messages:
                 yield self._file("motion_boundaries", view, direction), message
+
+    def _flow_at(
+        self, caster: SceneRayCaster, view: View, direction: Direction, where: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """(H, W, 2) the geometry's flow at some pixels (H, W), NaN at all others."""
+        flow = np.full((*where.shape, 2), np.nan, np.float32)
+        if where.any():
+            instant = self.samples[0].frame - FIRST_FRAME
+            flow[where] = find_surfaces(caster, view, instant, *np.nonzero(where)).flow(direction)
+        return flow

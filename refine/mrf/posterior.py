@@ -18,8 +18,9 @@ from refine.energy.affinity import NEIGHBORS, Floats
 from refine.energy.parameters import MRFParameters
 from refine.mrf.solve import checked_problem
 from refine.solvers.linear import SolverError
-from refine.solvers.multigrid import GivenSystem
-from refine.solvers.stencils import Couplings, couplings_of, crop, data_weight
+from refine.solvers.multigrid import MultigridSolver
+from refine.solvers.stencil.padding import crop
+from refine.solvers.stencil.weights import StencilWeights, data_weight, stencil_weights
 from stereoforge_kit.errors import InputError
 
 TOLERANCE = 1e-3
@@ -63,32 +64,32 @@ def posterior_deviation(
         raise InputError(f"samples must be at least 1, got {samples}")
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
     problem = replace(problem, gradient_factor=gradient_factor)
-    parts = couplings_of(problem, data_weight(problem))
-    system = GivenSystem(parts)
+    weights = stencil_weights(problem, data_weight(problem))
+    solver = MultigridSolver(weights)
     rng = np.random.default_rng(seed)
     total = np.zeros(problem.shape)
     for _ in range(samples):
-        noise = _perturbation(parts, rng)
+        noise = _perturbation(weights, rng)
         size = float(np.linalg.norm(noise))
-        solved = system.solve(noise, TOLERANCE)
-        if not solved.residual <= TOLERANCE * size:
+        solved = solver.solve(noise, TOLERANCE)
+        if not solved.residual_norm <= TOLERANCE * size:
             raise SolverError(
-                f"a sample of the posterior stopped at a relative residual of {solved.residual / size:.1e}, "
+                f"a sample of the posterior stopped at a relative residual of {solved.residual_norm / size:.1e}, "
                 f"short of {TOLERANCE:.1e}"
             )
         total += crop(solved.x) ** 2
     return np.sqrt(total / samples / 2).astype(np.float32)
 
 
-def _perturbation(parts: Couplings, rng: np.random.Generator) -> Floats:
+def _perturbation(weights: StencilWeights, rng: np.random.Generator) -> Floats:
     """F' n, padded: every term of the energy pushed by noise of its own weight."""
-    shape = parts.tau.shape
-    push: Floats = np.sqrt(parts.tau) * rng.standard_normal(shape)
-    for axis, weight in ((1, parts.axial[0]), (0, parts.axial[1])):
+    shape = weights.tau.shape
+    push: Floats = np.sqrt(weights.tau) * rng.standard_normal(shape)
+    for axis, weight in ((1, weights.gradient[0]), (0, weights.gradient[1])):
         flow = np.sqrt(weight) * rng.standard_normal(shape)
         push += np.roll(flow, 1, axis) - flow
-    flow = np.sqrt(parts.color) * rng.standard_normal(shape)
+    flow = np.sqrt(weights.color) * rng.standard_normal(shape)
     push += flow
-    for (dy, dx), weight in zip(NEIGHBORS, parts.weights, strict=True):
+    for (dy, dx), weight in zip(NEIGHBORS, weights.neighbors, strict=True):
         push -= np.roll(weight * flow, (dy, dx), (0, 1))
     return push

@@ -7,31 +7,32 @@ out.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, vectorize
+
+from stereoforge_kit.kernels import njit, vectorize
 
 # Numbers of Python's own would raise the arithmetic to 64 bits.
 _BLACK, _WHITE = np.float32(0), np.float32(255)
 _HALF, _ONE, _TWO, _THREE = np.float32(0.5), np.float32(1), np.float32(2), np.float32(3)
 
 
-@vectorize(["f4(f4,f4,f4)", "f8(f4,f4,f8)", "f8(f8,f8,f8)"], cache=True)
+@vectorize(["f4(f4,f4,f4)", "f8(f4,f4,f8)", "f8(f8,f8,f8)"])
 def blended(below, above, cover):
     return (above - below) * cover + below
 
 
-@vectorize(["f4(f4)", "f8(f8)"], cache=True)
+@vectorize(["f4(f4)", "f8(f8)"])
 def fraction(value):
     return value - np.floor(value)
 
 
-@vectorize(["f4(f4,f4,f4)", "f8(f8,f4,f4)"], cache=True)
+@vectorize(["f4(f4,f4,f4)", "f8(f8,f4,f4)"])
 def smooth_stepped(value, edge, width):
     t = (value - edge) / width + _HALF
     t = min(max(t, _BLACK), _ONE)
     return t * t * (_THREE - _TWO * t)
 
 
-@njit(cache=True)
+@njit()
 def to_bytes(picture):
     """(3, H, W) rounded to (H, W, 3) uint8."""
     _, height, width = picture.shape
@@ -44,7 +45,7 @@ def to_bytes(picture):
     return pixels
 
 
-@njit(cache=True)
+@njit()
 def grained(picture, fine, coarse_weight, fine_weight):
     """(3, H, W) to (H, W, 3) uint8 with noise (H, W) of one and two pixels' scale, in proportion to the brightness."""
     _, height, width = picture.shape
@@ -66,7 +67,7 @@ def grained(picture, fine, coarse_weight, fine_weight):
     return pixels
 
 
-@njit(cache=True)
+@njit()
 def nearest_of_grid(x, y, point_x, point_y, cells):
     """Of points (cells + 2)^2, one in each cell of a grid with a margin of one: each place's nearest.
 
@@ -95,7 +96,7 @@ def nearest_of_grid(x, y, point_x, point_y, cells):
     return nearest, first, second
 
 
-@njit(cache=True)
+@njit()
 def put_on_top(top, inside, row, column, number):
     """Write a number into a periodic picture (N, N) where a square mask about (row, column) is set."""
     size, side = len(top), len(inside)

@@ -13,7 +13,6 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen import StereoSample
 from datagen.sources.stereo_frame import StereoFrame
 from refine.evaluation.evaluate import EvaluationFrame
 from refine.evaluation.settings import Settings, read_settings
@@ -87,31 +86,30 @@ class Predictors:
     def frame(self, sample: StereoFrame) -> EvaluationFrame:
         """One sample with all that is predicted for it, and how long that took.
 
-        Where nobody knows what is occluded, nothing is taken to be. Object maps are KITTI's, cars told from the
-        rest; those of our own sets number everything. Frames of one folder are of one scene.
+        Where nobody knows what is occluded, nothing is taken to be.
         """
         occlusion = sample.occlusion_left
-        objects = None if isinstance(sample, StereoSample) else sample.object_index_left
+        left, right = sample.left, sample.right  # Read here: decoding and hashing are not the networks' time.
         began = time.perf_counter()
-        prediction = self.initial.predict(sample.left, sample.right)
+        prediction = self.initial.predict(left, right)
         seconds = {"disparity": time.perf_counter() - began}
         fine_tuned = None
         if self.fine_tuned is not None:
             began = time.perf_counter()
-            fine_tuned = self.fine_tuned.predict(sample.left, sample.right).disparity
+            fine_tuned = self.fine_tuned.predict(left, right).disparity
             seconds["fine_tuned"] = time.perf_counter() - began
         return EvaluationFrame(
             name=sample.name,
-            image=sample.left,
+            image=left,
             truth=sample.disparity_left,
             occlusion=np.zeros(sample.size, np.uint8) if occlusion is None else occlusion,
             disparity=prediction.disparity,
             confidence=prediction.confidence,
             gradient=prediction.gradient,
-            right=sample.right,
+            right=right,
             fine_tuned=fine_tuned,
-            objects=objects,
-            scene=sample.name.rpartition("/")[0],
+            objects=sample.foreground_left,
+            scene=sample.scene_name,
             other_confidences={}
             if self.forest is None
             else {"rdf": self._forest_confidence(sample, prediction)},
