@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from scenes import sample_scene
 from scenes.families.monkaa import PLACES, MonkaaConfig
 from scenes.landscapes.terrain import NEAREST_SHARE
@@ -40,7 +40,7 @@ def test_the_same_seed_gives_the_same_scene_and_json_keeps_it() -> None:
     assert sampled(12) != scene
     again = scene_from_json(scene_to_json(scene))
     assert again == scene
-    before, after = (SceneGeometry(s).vertices(0.0) for s in (scene, again))
+    before, after = (build_geometry(s).vertices(0.0) for s in (scene, again))
     assert np.array_equal(before, after)
 
 
@@ -48,7 +48,7 @@ def test_the_same_seed_gives_the_same_scene_and_json_keeps_it() -> None:
 @given(seed=seeds)
 def test_neither_camera_is_ever_inside_or_near_anything(seed: int) -> None:
     scene = sampled(seed, FEW)
-    geometry = SceneGeometry(scene)
+    geometry = build_geometry(scene)
     closest = scene.camera.disparity_metres / (NEAREST_SHARE * scene.camera.width)
     for time in (0.0, 11.5, 23.0):
         for view in ("left", "right"):
@@ -64,7 +64,7 @@ def test_neither_camera_is_ever_inside_or_near_anything(seed: int) -> None:
 @given(seed=seeds)
 def test_what_stands_stands_on_the_ground_throughout(seed: int) -> None:
     scene = sampled(seed, FEW)
-    geometry = SceneGeometry(scene)
+    geometry = build_geometry(scene)
     standing = [
         index
         for index, thing in enumerate(scene.objects)
@@ -81,7 +81,7 @@ def test_what_stands_stands_on_the_ground_throughout(seed: int) -> None:
 
 def test_all_parts_of_a_creature_stay_together() -> None:
     scene = sampled(5, FEW)
-    geometry = SceneGeometry(scene)
+    geometry = build_geometry(scene)
     body = next(k for k, t in enumerate(scene.objects) if t.name.startswith("creature 0 fur"))
     eyes = next(k for k, t in enumerate(scene.objects) if t.name.startswith("creature 0 eye"))
     gaps = []
@@ -95,7 +95,7 @@ def test_all_parts_of_a_creature_stay_together() -> None:
 
 def test_creatures_move_and_do_not_burst() -> None:
     scene = sampled(6, FEW)
-    geometry = SceneGeometry(scene)
+    geometry = build_geometry(scene)
     moved = 0
     for index, thing in enumerate(scene.objects):
         if thing.deformation is None:
@@ -113,7 +113,7 @@ def test_what_the_camera_sees_over_many_scenes() -> None:
     disparities, places, seen_creatures = [], set(), 0
     for seed in range(14):
         scene = sampled(seed)
-        seen = first_hits(scene, SceneGeometry(scene))
+        seen = first_hits(scene, build_geometry(scene))
         near = seen.disparity_960[seen.disparity_960 > 0]
         assert near.max() < 1.15 * NEAREST_SHARE * 960
         assert np.percentile(near, 1) < 0.6 * np.percentile(near, 95)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from scenes import sample_scene
 from scenes.families.sintel import SintelConfig
 from scenes.landscapes.terrain import NEAREST_SHARE
@@ -48,7 +48,7 @@ def test_the_same_seed_gives_the_same_scene_and_json_keeps_it() -> None:
 @given(seed=seeds)
 def test_neither_camera_is_ever_inside_or_near_anything(seed: int) -> None:
     scene = sampled(seed, FEW)
-    geometry = SceneGeometry(scene)
+    geometry = build_geometry(scene)
     closest = scene.camera.disparity_metres / (NEAREST_SHARE * scene.camera.width)
     for time in (0.0, 23.0):
         for view in ("left", "right"):
@@ -62,7 +62,7 @@ def test_neither_camera_is_ever_inside_or_near_anything(seed: int) -> None:
 @given(seed=seeds)
 def test_what_stands_stands_on_the_ground_throughout(seed: int) -> None:
     scene = sampled(seed, FEW)
-    geometry = SceneGeometry(scene)
+    geometry = build_geometry(scene)
     standing = [
         index
         for index, thing in enumerate(scene.objects)
@@ -82,7 +82,7 @@ def test_masonry_stands_on_the_lowest_ground_under_it() -> None:
     checked = 0
     for seed in range(8):
         scene = sampled(seed)
-        geometry = SceneGeometry(scene)
+        geometry = build_geometry(scene)
         for index, thing in enumerate(scene.objects):
             if not (thing.name.startswith("house") and thing.name.endswith("walls")):
                 continue
@@ -114,7 +114,7 @@ def test_what_the_camera_sees_over_many_scenes() -> None:
     disparities, places, seen_people, sky = [], set(), 0, []
     for seed in range(16):
         scene = sampled(seed)
-        seen = first_hits(scene, SceneGeometry(scene))
+        seen = first_hits(scene, build_geometry(scene))
         near = seen.disparity_960[seen.disparity_960 > 0]
         assert near.max() < 1.15 * NEAREST_SHARE * 960
         share = np.bincount(seen.index[seen.index >= 0], minlength=len(scene.objects)) / seen.index.size

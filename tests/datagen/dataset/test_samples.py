@@ -27,25 +27,25 @@ def test_samples_in_order_with_their_names(analytic_dataset: Path) -> None:
         train[4]
 
 
-@pytest.mark.parametrize("eye", ["left", "right"])
-def test_arrays_are_what_was_written(analytic_dataset: Path, eye: str) -> None:
+@pytest.mark.parametrize("view", ["left", "right"])
+def test_arrays_are_what_was_written(analytic_dataset: Path, view: str) -> None:
     sample = StereoDataset(analytic_dataset, "train")[3]
-    expected = render(make_scene(1), eye, instant=1)
+    expected = render(make_scene(1), view, instant=1)
     named = {
-        eye: expected.image,
-        f"disparity_{eye}": expected.disparity,
-        f"gradient_{eye}": expected.gradient,
-        f"gradient_valid_{eye}": expected.gradient_valid,
-        f"occlusion_{eye}": expected.occlusion,
-        f"object_index_{eye}": expected.object_index,
+        view: expected.image,
+        f"disparity_{view}": expected.disparity,
+        f"gradient_{view}": expected.gradient,
+        f"gradient_valid_{view}": expected.gradient_valid,
+        f"occlusion_{view}": expected.occlusion,
+        f"object_index_{view}": expected.object_index,
     }
     for name, array in named.items():
         read = getattr(sample, name)
         assert read.dtype == array.dtype, name
         np.testing.assert_array_equal(read, array, err_msg=name)
-    view = sample.view(eye)
-    assert view.disparity is getattr(sample, f"disparity_{eye}")
-    assert view.image is getattr(sample, eye)
+    arrays = sample.view(view)
+    assert arrays.disparity is getattr(sample, f"disparity_{view}")
+    assert arrays.image is getattr(sample, view)
     assert sample.size == (HEIGHT, WIDTH)
     assert sample.scene_record == make_scene(1)
 
@@ -140,7 +140,7 @@ def test_a_damaged_scene_record_is_named(own_dataset: Path) -> None:
 
 
 def test_reading_needs_neither_blender_nor_torch() -> None:
-    modules = "datagen, datagen.verify.run, datagen.gallery.page"
+    modules = "datagen, datagen.verify.dataset_check, datagen.gallery.page"
     code = f"import sys, {modules}; assert not {{'bpy', 'torch'}} & set(sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

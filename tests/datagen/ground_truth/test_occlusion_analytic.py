@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import Eye
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, VISIBLE
-from datagen.rendering.frames import EyeTargets, render_frames
+from datagen.dataset.layout import View
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.rendering.frames import ViewTargets, render_frames
 from tests.datagen.worlds import BASELINE_M, Plate, plates
 
 WIDTH, HEIGHT = 192, 108
@@ -47,10 +47,10 @@ def hit_depth(plate: Plate, origin_x: float, x: NDArray, y: NDArray) -> tuple[ND
 
 
 def closed_form(
-    items: tuple[Plate, ...], eye: Eye, pixel_centre: float = 0.5, baseline_m: float = BASELINE_M
+    items: tuple[Plate, ...], view: View, pixel_centre: float = 0.5, baseline_m: float = BASELINE_M
 ) -> dict[str, NDArray]:
     """Object index, disparity, occlusion labels, and which pixels are too close to an edge to call."""
-    own, other = (0.0, baseline_m) if eye == "left" else (baseline_m, 0.0)
+    own, other = (0.0, baseline_m) if view == "left" else (baseline_m, 0.0)
     x, y = np.meshgrid(
         (np.arange(WIDTH) + pixel_centre - WIDTH / 2) / WIDTH,
         -(np.arange(HEIGHT) + pixel_centre - HEIGHT / 2) / WIDTH,
@@ -60,7 +60,7 @@ def closed_form(
     tie = np.any([margin < TIE for _, margin in hits], axis=0)
     depth = depths.min(axis=0)
     disparity = WIDTH * abs(baseline_m) / depth
-    # The ray from the other eye through the point, in the same direction parametrisation.
+    # The ray from the other view through the point, in the same direction parametrisation.
     x_other = x + (own - other) / depth
     label = np.zeros(depth.shape, np.uint8)
     for item in items:
@@ -77,28 +77,28 @@ def closed_form(
 @pytest.fixture(scope="module", params=SCENES, ids=lambda name: name.replace(" ", "-"))
 def rendered(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[str, dict[Eye, EyeTargets]]:
+) -> tuple[str, dict[View, ViewTargets]]:
     scene = plates(WIDTH, HEIGHT, *SCENES[request.param])
     ((_, targets),) = render_frames(scene, tmp_path_factory.mktemp("blender"))
     return request.param, targets
 
 
-@pytest.mark.parametrize("eye", ["left", "right"])
+@pytest.mark.parametrize("view", ["left", "right"])
 def test_every_pixel_but_the_ties_equals_the_closed_form(
-    rendered: tuple[str, dict[Eye, EyeTargets]], eye: Eye
+    rendered: tuple[str, dict[View, ViewTargets]], view: View
 ) -> None:
     name, targets = rendered
-    truth = closed_form(SCENES[name], eye)
+    truth = closed_form(SCENES[name], view)
     sure = ~truth["tie"]
     assert sure.mean() > 0.9
-    np.testing.assert_array_equal(targets[eye].object_index[sure], truth["index"][sure])
+    np.testing.assert_array_equal(targets[view].object_index[sure], truth["index"][sure])
     np.testing.assert_allclose(
-        targets[eye].disparity[sure], truth["disparity"][sure], rtol=0, atol=DISPARITY_TOLERANCE_PX
+        targets[view].disparity[sure], truth["disparity"][sure], rtol=0, atol=DISPARITY_TOLERANCE_PX
     )
-    np.testing.assert_array_equal(targets[eye].occlusion[sure], truth["label"][sure])
+    np.testing.assert_array_equal(targets[view].occlusion[sure], truth["label"][sure])
 
 
-def test_the_closed_forms_hold_every_label(rendered: tuple[str, dict[Eye, EyeTargets]]) -> None:
+def test_the_closed_forms_hold_every_label(rendered: tuple[str, dict[View, ViewTargets]]) -> None:
     """Guards the scenes themselves: each must exercise what its name says."""
     name, targets = rendered
     found = set(np.unique(targets["left"].occlusion)) | set(np.unique(targets["right"].occlusion))
@@ -108,10 +108,10 @@ def test_the_closed_forms_hold_every_label(rendered: tuple[str, dict[Eye, EyeTar
 
 
 MISTAKES = {
-    "pixel corners for centres": {"eye": "left", "pixel_centre": 0.0},
-    "half a pixel too far": {"eye": "left", "pixel_centre": 1.0},
-    "right eye on the left": {"eye": "left", "baseline_m": -BASELINE_M},
-    "eyes swapped": {"eye": "right"},
+    "pixel corners for centres": {"view": "left", "pixel_centre": 0.0},
+    "half a pixel too far": {"view": "left", "pixel_centre": 1.0},
+    "right camera on the left": {"view": "left", "baseline_m": -BASELINE_M},
+    "views swapped": {"view": "right"},
 }
 
 
@@ -123,7 +123,7 @@ def test_the_classical_mistakes_would_be_seen(tmp_path: Path, mistake: str) -> N
     wrong = closed_form(items, **MISTAKES[mistake])
     sure = ~wrong["tie"]
     disparity_error = np.abs(targets["left"].disparity - wrong["disparity"])[sure]
-    if mistake == "right eye on the left":  # which does not move what the left eye itself sees
+    if mistake == "right camera on the left":  # which does not move what the left view itself sees
         assert (targets["left"].occlusion != wrong["label"])[sure].sum() > 20
     else:
         assert np.median(disparity_error) > 10 * DISPARITY_TOLERANCE_PX

@@ -62,11 +62,11 @@ def test_no_two_files_share_a_path() -> None:
         for scene in (0, 1, 11, 10001):
             paths += [LAYOUT.manifest(split, scene), LAYOUT.scene_record(split, scene)]
             for name, kind in KINDS.items():
-                if kind.per_eye:
-                    eyes_and_frames = [(eye, frame) for eye in ("left", "right") for frame in (6, 7)]
+                if kind.per_view:
+                    views_and_frames = [(view, frame) for view in ("left", "right") for frame in (6, 7)]
                     paths += [
                         LAYOUT.file(name, split, scene, *one, direction)
-                        for one in eyes_and_frames
+                        for one in views_and_frames
                         for direction in kind.directions
                     ]
                 else:
@@ -75,11 +75,11 @@ def test_no_two_files_share_a_path() -> None:
 
 
 @pytest.mark.parametrize(
-    ("eye", "frame"), [(None, 6), ("centre", 6), ("left", None), ("left", FIRST_FRAME - 1)]
+    ("view", "frame"), [(None, 6), ("centre", 6), ("left", None), ("left", FIRST_FRAME - 1)]
 )
-def test_a_file_of_an_eye_needs_eye_and_frame(eye: str | None, frame: int | None) -> None:
-    with pytest.raises(ValueError, match="needs an eye"):
-        LAYOUT.file("disparity", "train", 0, eye, frame)
+def test_a_file_of_a_view_needs_view_and_frame(view: str | None, frame: int | None) -> None:
+    with pytest.raises(ValueError, match="needs a view"):
+        LAYOUT.file("disparity", "train", 0, view, frame)
 
 
 def test_impossible_numbers_and_splits() -> None:

@@ -13,11 +13,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from datagen.dataset.layout import EYES, Eye
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
+from datagen.dataset.layout import VIEWS, View
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.ground_truth.labels import SAME_SURFACE
 from datagen.ground_truth.raycast import Hits, SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
-from datagen.rendering.frames import EyeTargets, RenderOptions, render_frames
+from datagen.ground_truth.scene_geometry import build_geometry
+from datagen.rendering.frames import RenderOptions, ViewTargets, render_frames
 from scenes import FAMILIES, Scene, sample_scene
 from tests.datagen.oracle import cast_depth, segment_is_blocked, to_camera_frame
 
@@ -34,15 +35,15 @@ class World:
     """The truth of one scene's first frame, and the triangles that Blender evaluated for it."""
 
     scene: Scene
-    truth: dict[Eye, Hits]
+    truth: dict[View, Hits]
     triangles: NDArray[np.float64]
 
     def seen_from(self, x_m: float) -> NDArray[np.float64]:
-        """(T, 3, 3) the triangles in the frame of an eye at x metres along the rig's axis; the left one is at 0."""
+        """(T, 3, 3) the triangles in the frame of a view at x metres along the rig's axis; the left one is at 0."""
         return to_camera_frame(self.triangles, self.scene.camera.pose("left", 0.0)) - (x_m, 0.0, 0.0)
 
-    def eye_at(self, eye: Eye) -> float:
-        return 0.0 if eye == "left" else self.scene.camera.baseline_m
+    def camera_x(self, view: View) -> float:
+        return 0.0 if view == "left" else self.scene.camera.baseline_m
 
     def cast_depth(self, x_m: float, shift_px: float = 0.0) -> NDArray[np.float64]:
         camera = self.scene.camera
@@ -54,9 +55,9 @@ class Picture:
     """One rendered scene."""
 
     scene: Scene
-    targets: dict[Eye, EyeTargets]
+    targets: dict[View, ViewTargets]
     cycles: NDArray[np.float64]
-    """(H, W) disparity of the left eye by Cycles' depth pass."""
+    """(H, W) disparity of the left view by Cycles' depth pass."""
 
 
 def scenes_of(family: str, sizes: tuple[tuple[int, int, int], ...]) -> Iterator[Scene]:
@@ -75,10 +76,10 @@ def worlds(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
     made = []
     for scene in scenes_of(request.param, MANY):
-        caster = SceneRayCaster(SceneGeometry(scene))
+        caster = SceneRayCaster(build_geometry(scene))
         with quiet(tmp_path_factory.mktemp("blender") / "log"):
             place(build_world(caster.geometry, start_empty_file(CyclesSettings(samples=1))), "left", 0.0)
-        made.append(World(scene, {eye: caster.cast_all(eye, 0.0) for eye in EYES}, evaluated_triangles()))
+        made.append(World(scene, {view: caster.cast_all(view, 0.0) for view in VIEWS}, evaluated_triangles()))
     return made
 
 
@@ -94,7 +95,7 @@ def pictures(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 
 
 def cycles_disparity(scene: Scene, scratch: Path) -> NDArray[np.float64]:
-    """(H, W) the left eye's disparity by Cycles' own depth pass, its pixel filter as narrow as it gets."""
+    """(H, W) the left view's disparity by Cycles' own depth pass, its pixel filter as narrow as it gets."""
     from datagen.blender.build import build_world, place
     from datagen.blender.camera import render_channels
     from datagen.blender.session import CyclesSettings, quiet, start_empty_file
@@ -104,7 +105,7 @@ def cycles_disparity(scene: Scene, scratch: Path) -> NDArray[np.float64]:
         blender_scene.view_layers[0].use_pass_z = True
         blender_scene.cycles.use_denoising = False
         blender_scene.cycles.pixel_filter_type, blender_scene.cycles.filter_width = "BOX", 0.01
-        world = build_world(SceneGeometry(scene), blender_scene)
+        world = build_world(build_geometry(scene), blender_scene)
         place(world, "left", 0.0)
         channels = render_channels(world, "depth", 0, scratch)
     depth = channels["Depth.Z" if "Depth.Z" in channels else "Depth.V"].astype(np.float64)
@@ -112,25 +113,25 @@ def cycles_disparity(scene: Scene, scratch: Path) -> NDArray[np.float64]:
 
 
 def errors(
-    worlds: list[World], eye: Eye, *, seen_as: Eye | None = None, sign: float = 1.0, shift_px: float = 0.0
+    worlds: list[World], view: View, *, seen_as: View | None = None, sign: float = 1.0, shift_px: float = 0.0
 ) -> NDArray[np.float64]:
     """|truth - cast| of every pixel of every world, px; the rays cast from a wrong place on request."""
     found = []
     for world in worlds:
-        depth = world.cast_depth(sign * world.eye_at(seen_as or eye), shift_px)
-        stored = world.truth[eye].disparity.astype(np.float32)
+        depth = world.cast_depth(sign * world.camera_x(seen_as or view), shift_px)
+        stored = world.truth[view].disparity.astype(np.float32)
         found.append(np.abs(stored - world.scene.camera.disparity_metres / depth).ravel())
     return np.concatenate(found)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("eye", EYES)
-def test_disparity_equals_the_float64_ray_cast(worlds: list[World], eye: Eye) -> None:
-    error = errors(worlds, eye)
+@pytest.mark.parametrize("view", VIEWS)
+def test_disparity_equals_the_float64_ray_cast(worlds: list[World], view: View) -> None:
+    error = errors(worlds, view)
     median, p999 = np.percentile(error, (50, 99.9))
     off = float((error > 0.1).mean())
     print(
-        f"{worlds[0].scene.family} {eye}: {len(worlds)} scenes, {error.size} px, median {median:.1e} px, "
+        f"{worlds[0].scene.family} {view}: {len(worlds)} scenes, {error.size} px, median {median:.1e} px, "
         f"p99.9 {p999:.1e} px, off by > 0.1 px {off:.1e}"
     )
     assert median <= 1e-4
@@ -138,12 +139,12 @@ def test_disparity_equals_the_float64_ray_cast(worlds: list[World], eye: Eye) ->
     assert off <= 1e-4
 
 
-MISTAKES: dict[str, tuple[Eye, dict[str, Any]]] = {
+MISTAKES: dict[str, tuple[View, dict[str, Any]]] = {
     "left half a pixel left": ("left", {"shift_px": -0.5}),
     "left half a pixel right": ("left", {"shift_px": 0.5}),
     "right half a pixel left": ("right", {"shift_px": -0.5}),
     "right half a pixel right": ("right", {"shift_px": 0.5}),
-    "right eye on the left": ("right", {"sign": -1.0}),
+    "right camera on the left": ("right", {"sign": -1.0}),
     "right for left": ("left", {"seen_as": "right"}),
     "left for right": ("right", {"seen_as": "left"}),
 }
@@ -152,27 +153,27 @@ MISTAKES: dict[str, tuple[Eye, dict[str, Any]]] = {
 @pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_the_classical_mistakes_would_break_the_bars(worlds: list[World], mistake: str) -> None:
-    eye, wrongly = MISTAKES[mistake]
-    error = errors(worlds[:2], eye, **wrongly)
+    view, wrongly = MISTAKES[mistake]
+    error = errors(worlds[:2], view, **wrongly)
     assert np.percentile(error, 99.9) > 1.0
     assert (error > 0.1).mean() > 1e-3
 
 
-def wrong_labels(worlds: list[World], eye: Eye, sign: float = 1.0) -> tuple[int, int]:
-    """Of some pixels of every world, each against every triangle between it and the other eye: how many differ.
+def wrong_labels(worlds: list[World], view: View, sign: float = 1.0) -> tuple[int, int]:
+    """Of some pixels of every world, each against every triangle between it and the other view: how many differ.
 
-    sign: -1 to look for the other eye on the wrong side.
+    sign: -1 to look for the other view on the wrong side.
     """
     rng = np.random.default_rng(1)
     wrong = total = 0
     for world in worlds:
-        camera, labels = world.scene.camera, world.truth[eye].occlusion
-        triangles = world.seen_from(world.eye_at(eye))
+        camera, labels = world.scene.camera, world.truth[view].occlusion
+        triangles = world.seen_from(world.camera_x(view))
         rows, columns = np.unravel_index(
             rng.choice(np.flatnonzero(labels != OUT_OF_FRAME), 60, replace=False), labels.shape
         )
-        depth = world.cast_depth(world.eye_at(eye))[rows, columns]
-        other = np.array([sign * (1.0 if eye == "left" else -1.0) * camera.baseline_m, 0.0, 0.0])
+        depth = world.cast_depth(world.camera_x(view))[rows, columns]
+        other = np.array([sign * (1.0 if view == "left" else -1.0) * camera.baseline_m, 0.0, 0.0])
         x, y = columns + 0.5 - camera.width / 2, camera.height / 2 - rows - 0.5
         rays = np.stack([x / camera.focal_px, y / camera.focal_px, -np.ones(len(rows))], -1)
         for ray, z, label in zip(rays, depth, labels[rows, columns], strict=True):
@@ -183,17 +184,17 @@ def wrong_labels(worlds: list[World], eye: Eye, sign: float = 1.0) -> tuple[int,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("eye", EYES)
-def test_occlusion_equals_rays_in_double_precision(worlds: list[World], eye: Eye) -> None:
-    wrong, total = wrong_labels(worlds, eye)
-    print(f"{worlds[0].scene.family} {eye}: {wrong} of {total} labels differ")
+@pytest.mark.parametrize("view", VIEWS)
+def test_occlusion_equals_rays_in_double_precision(worlds: list[World], view: View) -> None:
+    wrong, total = wrong_labels(worlds, view)
+    print(f"{worlds[0].scene.family} {view}: {wrong} of {total} labels differ")
     assert wrong <= 0.002 * total
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("eye", EYES)
-def test_occlusion_from_the_wrong_side_would_be_seen(worlds: list[World], eye: Eye) -> None:
-    wrong, total = wrong_labels(worlds, eye, sign=-1.0)
+@pytest.mark.parametrize("view", VIEWS)
+def test_occlusion_from_the_wrong_side_would_be_seen(worlds: list[World], view: View) -> None:
+    wrong, total = wrong_labels(worlds, view, sign=-1.0)
     assert wrong > 0.02 * total
 
 
@@ -210,9 +211,9 @@ def test_cycles_shows_the_surfaces_that_the_truth_is_of(pictures: list[Picture])
 
 @pytest.mark.slow
 def test_what_is_rendered_is_what_is_compared_here(pictures: list[Picture]) -> None:
-    caster = SceneRayCaster(SceneGeometry(pictures[0].scene))
-    for eye in EYES:
-        hits, targets = caster.cast_all(eye, 0.0), pictures[0].targets[eye]
+    caster = SceneRayCaster(build_geometry(pictures[0].scene))
+    for view in VIEWS:
+        hits, targets = caster.cast_all(view, 0.0), pictures[0].targets[view]
         assert np.array_equal(targets.disparity, hits.disparity.astype(np.float32))
         assert np.array_equal(targets.object_index, hits.object_index)
         assert np.array_equal(targets.occlusion, hits.occlusion)
@@ -256,13 +257,13 @@ def test_warping_right_to_left_reproduces_it_where_visible(pictures: list[Pictur
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("eye", EYES)
-def test_occlusion_agrees_with_the_other_eyes_disparity(pictures: list[Picture], eye: Eye) -> None:
-    """A visible point is seen at the same disparity by the other eye, an occluded one behind something nearer."""
-    sign, other_eye = (-1.0, "right") if eye == "left" else (1.0, "left")
+@pytest.mark.parametrize("view", VIEWS)
+def test_occlusion_agrees_with_the_other_views_disparity(pictures: list[Picture], view: View) -> None:
+    """A visible point is seen at the same disparity by the other view, an occluded one behind something nearer."""
+    sign, other_view = (-1.0, "right") if view == "left" else (1.0, "left")
     visible_agrees, occluded_agrees = [], []
     for picture in pictures:
-        own, other = picture.targets[eye], picture.targets[other_eye]
+        own, other = picture.targets[view], picture.targets[other_view]
         height, width = own.disparity.shape
         rows, columns = np.mgrid[:height, :width]
         x = columns + sign * own.disparity
@@ -278,7 +279,7 @@ def test_occlusion_agrees_with_the_other_eyes_disparity(pictures: list[Picture],
     # leaves and fences, which only some families are full of.
     thin = pictures[0].scene.family != "flying_things"
     visible, occluded = (float(np.concatenate(each).mean()) for each in (visible_agrees, occluded_agrees))
-    print(f"{eye}: {visible:.2%} of visible, {occluded:.2%} of occluded points agree")
+    print(f"{view}: {visible:.2%} of visible, {occluded:.2%} of occluded points agree")
     assert visible > (0.97 if thin else 0.99)
     assert occluded > (0.92 if thin else 0.99)
 

@@ -16,8 +16,8 @@ from datagen import render_dataset
 from datagen.dataset.manifest import SceneManifest
 from datagen.executors import RayExecutor, WorkerPolicy
 from stereoforge_kit.processes import Limits
+from tests.datagen.executors.test_executors import misbehave
 from tests.datagen.sabotage import RECIPE, hashes
-from tests.datagen.test_executors import misbehave
 
 FIRST, SECOND = "127.0.0.2", "127.0.0.3"
 """Addresses of this machine alone; Ray would replace 127.0.0.1 by one that others can reach."""

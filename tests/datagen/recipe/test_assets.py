@@ -1,4 +1,4 @@
-"""The user's own files: prepared in a guarded process, used in one split each, part of the data set."""
+"""User assets: prepared in a guarded process, used in one split each, part of the data set."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
 from datagen.recipe.assets import ImportedAssets, _import_folder, import_assets
 from datagen.rendering.estimate import estimate_run
-from datagen.verify.run import verify_dataset
+from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, scene_from_json, scene_to_json
 from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture, use_store
 from stereoforge.commands.render import Render
@@ -196,7 +196,9 @@ def test_a_data_set_carries_the_files_it_uses(user: Path, tmp_path: Path) -> Non
     record = json.loads(Layout(out).scene_record("train", 0).read_text())
     assert any(thing["shape"]["kind"] == "UserMesh" for thing in record["objects"])
     # Its recipe elsewhere lacks them, and is refused before anything is made.
-    with pytest.raises(DatasetError, match="give the folders of your own files again"):
+    with pytest.raises(
+        DatasetError, match="give the folders of your meshes, textures and environments again"
+    ):
         render_dataset(written, tmp_path / "other")
     assert not (tmp_path / "other").exists()
     with pytest.raises(DatasetError, match="a folder, not a URL"):

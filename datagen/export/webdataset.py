@@ -1,6 +1,6 @@
-"""Shards for streaming (docs/conventions.md): tar files as webdataset reads them, with one sample a frame.
+"""Shards for streaming (docs/conventions.md): tar files as webdataset reads them, with one sample for each frame.
 
-The members of a sample have the very bytes of the data set's files; the same frames give the same shards.
+The members of a sample have the same bytes as the data set's files, and the same frames give the same shards.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import tarfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 
-from datagen.dataset.layout import EYES, KINDS, RENDER_PASSES, TARGETS
+from datagen.dataset.layout import KINDS, RENDER_PASSES, TARGETS, VIEWS
 from datagen.dataset.manifest import FileEntry, file_entry, read_manifest, seal
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.errors import DatasetError
@@ -27,7 +27,18 @@ def export_webdataset(
     frames_per_shard: int,
     progress: Callable[[int, int], None],
 ) -> None:
-    """Write the frames of each split in order, so many to a file; each file is there whole or not at all."""
+    """Write the frames of each split in order. Each shard is written whole or not at all.
+
+    Args:
+        sets: One data set for each split.
+        out: The folder or URL to write to.
+        frames_per_shard: Number of samples in one tar file.
+        progress: Called with (frames done, frames in all).
+
+    Raises:
+        ValueError: For fewer than one frame in a shard.
+        DatasetError: For damaged files, or a recipe that is not that of the scenes.
+    """
     if frames_per_shard < 1:
         raise ValueError(f"a shard holds at least one frame, got {frames_per_shard}")
     total, done = sum(map(len, sets)), 0
@@ -49,7 +60,7 @@ def export_webdataset(
 
 
 def _recipe_text(sample: StereoSample) -> str:
-    """The recipe that a sample's scene was rendered by. Raises DatasetError if the data set's is another one."""
+    """The text of the data set's recipe. Raises DatasetError if a sample's scene was rendered by another recipe."""
     layout = sample.layout
     recipe = read_recipe(layout.recipe)
     manifest = read_manifest(layout.local(layout.manifest(sample.split, sample.scene)))
@@ -59,7 +70,7 @@ def _recipe_text(sample: StereoSample) -> str:
 
 
 def _add(tar: tarfile.TarFile, sample: StereoSample) -> str:
-    """Add a sample's members; return its key."""
+    """Add a sample's members to a shard; return the sample's key."""
     key = f"{sample.split}-{sample.scene:04d}-{sample.frame:04d}"
     members = dict(_members(sample))
     digests = {what: hashlib.sha256(data).hexdigest() for what, data in members.items()}
@@ -73,9 +84,9 @@ def _add(tar: tarfile.TarFile, sample: StereoSample) -> str:
 
 def _members(sample: StereoSample) -> Iterator[tuple[str, bytes]]:
     for kind in (RENDER_PASSES[sample.render_pass], *TARGETS):
-        for eye in EYES if KINDS[kind].per_eye else ():
-            path = sample.layout.file(kind, sample.split, sample.scene, eye, sample.frame)
-            what = eye if kind in RENDER_PASSES.values() else f"{kind}_{eye}"
+        for view in VIEWS if KINDS[kind].per_view else ():
+            path = sample.layout.file(kind, sample.split, sample.scene, view, sample.frame)
+            what = view if kind in RENDER_PASSES.values() else f"{kind}_{view}"
             yield f"{what}{path.suffix}", sample.intact(path).read_bytes()
 
 

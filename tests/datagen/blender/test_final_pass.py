@@ -13,9 +13,9 @@ from datagen.blender.build import BuiltWorld, build_world, place
 from datagen.blender.camera import render_radiance
 from datagen.blender.final_pass import HAZE_HEIGHT, render_final
 from datagen.blender.session import CyclesSettings, quiet, start_empty_file
-from datagen.dataset.layout import EYES, Eye
-from datagen.ground_truth.scene_geometry import SceneGeometry
-from datagen.rendering.frames import EyeTargets, RenderOptions, render_frames
+from datagen.dataset.layout import VIEWS, View
+from datagen.ground_truth.scene_geometry import build_geometry
+from datagen.rendering.frames import RenderOptions, ViewTargets, render_frames
 from datagen.rendering.sensor import Sensor, vignette
 from scenes import Scene
 from scenes.motion.deformations.sway import Sway
@@ -58,11 +58,11 @@ def plate(motion: Trajectory, depth_scale: float = 1.0) -> SceneObject:
 
 def built(scene: Scene, folder: Path, samples: int = 32) -> BuiltWorld:
     with quiet(folder / "log"):
-        return build_world(SceneGeometry(scene), start_empty_file(CyclesSettings(samples)))
+        return build_world(build_geometry(scene), start_empty_file(CyclesSettings(samples)))
 
 
 def final_radiance(scene: Scene, folder: Path, frame: int = 0, exposure: float = 1.0) -> NDArray[np.float32]:
-    """Left eye."""
+    """Left view."""
     world = built(scene, folder)
     with quiet(folder / "log"):
         return render_final(world, frame, exposure, folder)["left"]
@@ -86,7 +86,7 @@ MOVING_EVERYTHING = world_of(
 
 
 def test_ground_truth_and_clean_pictures_are_the_same_bytes_with_a_final_pass(tmp_path: Path) -> None:
-    runs: list[list[dict[Eye, EyeTargets]]] = []
+    runs: list[list[dict[View, ViewTargets]]] = []
     for passes in (("clean",), ("clean", "final"), ("final",)):
         options = RenderOptions(samples=2, passes=passes, targets=("normals", "optical_flow"))
         runs.append([targets for _, targets in render_frames(MOVING_EVERYTHING, tmp_path, options)])
@@ -94,16 +94,16 @@ def test_ground_truth_and_clean_pictures_are_the_same_bytes_with_a_final_pass(tm
     without, both, only_final = runs
     for run in (both, only_final):
         for frame, expected in zip(run, without, strict=True):
-            for eye in EYES:
+            for view in VIEWS:
                 for name in ("disparity", "gradient", "gradient_valid", "occlusion", "object_index"):
-                    assert np.array_equal(getattr(frame[eye], name), getattr(expected[eye], name)), name
-                for key, values in expected[eye].extra.items():
-                    assert np.array_equal(frame[eye].extra[key], values), key
+                    assert np.array_equal(getattr(frame[view], name), getattr(expected[view], name)), name
+                for key, values in expected[view].extra.items():
+                    assert np.array_equal(frame[view].extra[key], values), key
     for first, second, third in zip(without, both, only_final, strict=True):
-        for eye in EYES:
-            assert np.array_equal(first[eye].images["clean"], second[eye].images["clean"])
-            assert np.array_equal(second[eye].images["final"], third[eye].images["final"])
-            assert not np.array_equal(second[eye].images["final"], second[eye].images["clean"])
+        for view in VIEWS:
+            assert np.array_equal(first[view].images["clean"], second[view].images["clean"])
+            assert np.array_equal(second[view].images["final"], third[view].images["final"])
+            assert not np.array_equal(second[view].images["final"], second[view].images["clean"])
 
 
 @pytest.mark.parametrize("frame", [0, 1])
@@ -201,11 +201,11 @@ def test_defocus_blurs_by_the_lens_equation(tmp_path: Path) -> None:
             assert 0.8 * diameter_px / 4 < spread < 1.35 * diameter_px / 4
 
 
-def expose(final: FinalPass, eye: Eye = "left", frame: int = 0, level: float = 0.5) -> NDArray[np.float32]:
-    return Sensor(world_of(final)).expose(np.full((120, 160, 3), level, np.float32), 1.0, eye, frame)
+def expose(final: FinalPass, view: View = "left", frame: int = 0, level: float = 0.5) -> NDArray[np.float32]:
+    return Sensor(world_of(final)).expose(np.full((120, 160, 3), level, np.float32), 1.0, view, frame)
 
 
-def test_noise_grows_with_the_root_of_light_and_follows_from_scene_frame_and_eye() -> None:
+def test_noise_grows_with_the_root_of_light_and_follows_from_scene_frame_and_view() -> None:
     noisy = FinalPass(noise=0.04)
     for level in (0.1, 0.9):
         values = expose(noisy, level=level)

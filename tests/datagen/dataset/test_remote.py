@@ -20,7 +20,7 @@ from datagen.dataset.layout import Layout
 from datagen.dataset.shards import CACHE_VARIABLE
 from datagen.executors import Failure, Outcome
 from datagen.executors.base import Outcomes
-from datagen.verify.run import verify_dataset
+from datagen.verify.dataset_check import verify_dataset
 from stereoforge.cli import main
 from stereoforge_kit.files import Tree, open_tree
 from tests.datagen.analytic_world import vouch

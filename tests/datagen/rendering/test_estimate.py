@@ -19,7 +19,7 @@ from scenes.shapes.solids.basic import Box, Superquadric
 from scenes.shapes.solids.revolved import Cylinder
 from stereoforge.cli import main
 
-FOLDER = Path(__file__).parents[2] / "recipes"
+FOLDER = Path(__file__).parents[3] / "recipes"
 RECIPES = [path for path in sorted(FOLDER.glob("*.yaml")) if "\ndomains:" not in path.read_text()]
 """Of data sets; studies have recipes of another kind."""
 WORLD = FAMILIES["flying_things"].config(

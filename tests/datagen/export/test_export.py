@@ -18,7 +18,7 @@ from datagen.export import EXPORTERS, ExportOptions
 from datagen.export.kitti import encode_disparity, vehicle_numbers
 from datagen.export.lidar import lidar_mask
 from datagen.sources.registry import open_source
-from datagen.verify.run import verify_dataset
+from datagen.verify.dataset_check import verify_dataset
 from scenes import sample_scene
 from stereoforge.cli import main
 from stereoforge_kit.files import open_tree
@@ -134,10 +134,10 @@ def test_webdataset_shards_stream_the_same_bytes(analytic_dataset: Path, tmp_pat
     for sample, frame in zip(samples, frames, strict=True):
         members = {name for name in sample if not name.startswith("__")}
         assert members == {
-            *(f"{eye}.png" for eye in ("left", "right")),
-            *(f"disparity_{eye}.pfm" for eye in ("left", "right")),
-            *(f"disparity_gradient_{eye}.exr" for eye in ("left", "right")),
-            *(f"{kind}_{eye}.png" for kind in ("occlusion", "object_index") for eye in ("left", "right")),
+            *(f"{view}.png" for view in ("left", "right")),
+            *(f"disparity_{view}.pfm" for view in ("left", "right")),
+            *(f"disparity_gradient_{view}.exr" for view in ("left", "right")),
+            *(f"{kind}_{view}.png" for kind in ("occlusion", "object_index") for view in ("left", "right")),
             "meta.json",
         }
         disparity = layout.file("disparity", "train", frame.scene, "right", frame.frame)

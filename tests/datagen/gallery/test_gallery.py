@@ -34,24 +34,24 @@ def pictures(page: str, alt: str) -> list[np.ndarray]:
 def test_every_scene_is_there_with_all_its_pictures(page: str) -> None:
     names = re.findall(r"<h3>(.*?)</h3>", page)
     assert names == ["TRAIN/A/0000/0006", "TRAIN/A/0001/0006", "TEST/A/0000/0006"]
-    views = [(make_scene(scene), eye) for scene in (0, 1, 0) for eye in ("left", "right")]
-    expected = [render(scene, eye, instant=0) for scene, eye in views]
-    for alt, which in (("Left eye", expected[::2]), ("Right eye", expected[1::2])):
+    shown_views = [(make_scene(scene), view) for scene in (0, 1, 0) for view in ("left", "right")]
+    expected = [render(scene, view, instant=0) for scene, view in shown_views]
+    for alt, which in (("Left view", expected[::2]), ("Right view", expected[1::2])):
         shown = pictures(page, alt)
         assert len(shown) == 3
         for picture, view in zip(shown, which, strict=True):
             assert np.abs(picture.astype(int) - view.image).mean() < 12  # JPEG of a lively picture
     for picture, view in zip(pictures(page, "Objects"), expected[::2], strict=True):
         np.testing.assert_array_equal(picture, index_picture(view.object_index))
-    for alt in ("Disparity", "Not visible to the right eye", "Disparity gradient"):
+    for alt in ("Disparity", "Not visible in the right view", "Disparity gradient"):
         assert [picture.shape for picture in pictures(page, alt)] == [(64, 96, 3)] * 3
 
 
 def test_numbers_are_the_data_s(page: str, analytic_dataset: Path) -> None:
     assert "flying_things at 96 × 64: 4 train, 2 test stereo pairs." in page
     sample = StereoDataset(analytic_dataset, "train")[0]
-    hidden = (sample.occlusion_left > 0).mean()
-    assert f"{hidden:.1%} of the left view is not visible" in page
+    not_visible = (sample.occlusion_left > 0).mean()
+    assert f"{not_visible:.1%} of the left view is not visible" in page
     assert f"3 objects in view, disparity 0.0 to {np.percentile(sample.disparity_left, 99):.1f} px" in page
     assert page.count("<svg") == 1 + 4  # the colour filters, and the plots
     assert "All 3 finished scenes." in page
@@ -114,6 +114,6 @@ def test_of_a_rendered_data_set(rendered_dataset: Path, tmp_path: Path) -> None:
     write_gallery(rendered_dataset, tmp_path / "g.html")
     text = (tmp_path / "g.html").read_text(encoding="utf-8")
     assert len(text) < 2 * 400_000
-    lefts, sample = pictures(text, "Left eye"), StereoDataset(rendered_dataset, "train")[0]
+    lefts, sample = pictures(text, "Left view"), StereoDataset(rendered_dataset, "train")[0]
     assert np.abs(lefts[0].astype(int) - sample.left).mean() < 12
     assert lefts[0].std() > 10

@@ -44,7 +44,7 @@ DAMAGED = {
     "negative frame": f"Frame -6\nL {NUMBERS}\nR {NUMBERS}\n".encode(),
     "cut": f"Frame 6\nL {NUMBERS}\n".encode(),
     "fifteen numbers": f"Frame 6\nL {NUMBERS}\nR {NUMBERS[2:]}\n".encode(),
-    "eyes swapped": f"Frame 6\nR {NUMBERS}\nL {NUMBERS}\n".encode(),
+    "views swapped": f"Frame 6\nR {NUMBERS}\nL {NUMBERS}\n".encode(),
     "no number": f"Frame 6\nL {NUMBERS}\nR {NUMBERS[2:]} x\n".encode(),
     "not finite": f"Frame 6\nL {NUMBERS}\nR {NUMBERS[2:]} nan\n".encode(),
     "twice": f"Frame 6\nL {NUMBERS}\nR {NUMBERS}\nFrame 6\nL {NUMBERS}\nR {NUMBERS}\n".encode(),

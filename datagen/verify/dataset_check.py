@@ -1,4 +1,4 @@
-"""Is a data set what its manifests, its recipe and its scenes say? Every file, every frame, no Blender."""
+"""Checking a whole data set against its manifests, its recipe and its scenes, without Blender."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from contextlib import closing, contextmanager
 from itertools import islice
 from pathlib import Path
 
-from datagen.dataset.layout import KINDS, SPLITS, Layout
-from datagen.dataset.remote_cache import MirroredLayout, open_mirror
+from datagen.dataset.layout import KINDS, SPLITS, Layout, SceneKey
+from datagen.dataset.remote_cache import RemoteLayout, open_remote
 from datagen.dataset.samples import open_layout
 from datagen.recipe.recipe import Recipe, read_recipe, recipe_to_text
 from datagen.rendering.quarantine import quarantined_scenes
@@ -20,9 +20,9 @@ from datagen.verify.shard_check import has_shards, verify_shards
 from stereoforge_kit.files import LocalTree, open_tree, temporary_folder
 
 FEW_SCENES = 8
-"""Fewer scenes than this are checked before other processes would have started."""
+"""Fewer scenes than this are checked in this process: others would take longer to start."""
 CHECK_TIMEOUT_S = 600.0
-"""Of one scene."""
+"""How long the check of one scene may take."""
 
 
 def verify_dataset(
@@ -31,22 +31,21 @@ def verify_dataset(
     *,
     workers: int | None = None,
     sampled_pixels: int = SAMPLED_PIXELS,
-    only: Collection[tuple[str, int]] | None = None,
+    only: Collection[SceneKey] | None = None,
 ) -> VerifyReport:
     """Check every file and every frame of a data set, or every file of shards exported from one.
 
-    Files: size and SHA-256 as in the manifest, none missing, none that belongs to nothing. Arrays: they
-    decode, have the camera's size and are finite; gradients, occlusion, object index and the two views'
-    disparities agree. Geometry: poses are the scene's, and `sampled_pixels` random pixels of each view agree
-    with rays cast at the scene's meshes.
+    Files have the size and SHA-256 of the manifest; none is missing, and none belongs to no scene. Arrays decode,
+    have the camera's size and are finite; gradients, occlusion, object index and the two views' disparities agree.
+    Poses are those of the scene, and `sampled_pixels` random pixels of each view agree with rays cast at its meshes.
 
     Args:
         root: The data set's folder, or a URL.
         progress: Called after each scene with (scenes done, scenes in all).
-        workers: Processes with limits of time and memory; None for one a core, or this process alone for sets
-            of under `FEW_SCENES`.
-        sampled_pixels: Of each view, for the rays; 0 leaves the geometry out, which is most of the time.
-        only: Check these (split, scene) and nothing else.
+        workers: Worker processes, with limits of time and memory; None for one per core, or for this process alone
+            if there are fewer scenes than `FEW_SCENES`.
+        sampled_pixels: Number of rays for each view; 0 leaves out the geometry, which takes most of the time.
+        only: Check these (split, number) and nothing else.
 
     Raises:
         DatasetError: For a folder that is missing or no data set at all, or a recipe or index that cannot be read.
@@ -87,21 +86,21 @@ def verify_dataset(
 
 @contextmanager
 def _opened(root: Path | str) -> Iterator[Layout]:
-    """The layout of a folder; behind a URL, one with copies that are gone afterwards."""
+    """The layout of a folder, or that of a URL with a cache that is removed afterwards."""
     tree = open_tree(root)
     if isinstance(tree, LocalTree):
         yield open_layout(root)
         return
     with temporary_folder() as folder:
-        yield open_mirror(tree, folder)
+        yield open_remote(tree, folder)
 
 
 def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
-    """Run the checks, as they end, in worker processes if they are worth starting or asked for."""
+    """Run the checks and yield them as they end, in worker processes if those are asked for or worth starting."""
     if workers is None and len(checks) < FEW_SCENES:
         yield from map(_check, checks)
         return
-    # A Scene record that nobody vouches for can ask for any mesh: what it takes to build is limited.
+    # An untrusted Scene record can ask for any mesh: the time and memory to build it are limited.
     executor = local_executor(workers, timeout_s=CHECK_TIMEOUT_S)
     with closing(executor.run(_check, checks)) as outcomes:
         for outcome in outcomes:
@@ -115,13 +114,13 @@ def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
 
 def _check(check: SceneCheck) -> SceneCheck:
     result = check.run()
-    if isinstance(check.layout, MirroredLayout):
+    if isinstance(check.layout, RemoteLayout):
         check.layout.forget(check.split, check.scene)
     return result
 
 
 def _recipe_problems(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
-    """Whether the recipe is byte for byte what was written, and has all the scenes that there are."""
+    """The recipe is byte for byte what was written, and has all finished scenes."""
     name = layout.recipe.name
     if layout.recipe.read_bytes() != recipe_to_text(recipe).encode():
         yield Problem(name, "is not as it was written")
@@ -133,12 +132,12 @@ def _recipe_problems(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
 
 
 def _unfinished(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
-    """Scenes that the recipe promises and that have no manifest."""
+    """The scenes of the recipe that are not finished."""
     for split, count in recipe.scenes.items():
         there = set(layout.committed_scenes(split))
         missing = count - sum(scene < count for scene in there)
         if missing:
-            # The recipe may promise any number: it is never written out.
+            # The recipe may have any number of scenes: list only the first few.
             first = list(islice((scene for scene in range(count) if scene not in there), 10))
             numbers = ", ".join(map(str, first)) + (", ..." if missing > 10 else "")
             failed = sum(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from datagen import DatasetError, Recipe
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.curation import Curation
 from scenes import FAMILIES, Scene
 
@@ -25,7 +25,7 @@ def recipe(family: str, low: float, high: float) -> Recipe:
 
 def surfaces(scene: Scene) -> NDArray[np.float64]:
     rows, columns = (grid.ravel() for grid in np.mgrid[3:270:9, 3:480:9])
-    hits = SceneRayCaster(SceneGeometry(scene)).cast("left", 0, rows, columns)
+    hits = SceneRayCaster(build_geometry(scene)).cast("left", 0, rows, columns)
     return hits.disparity[hits.object_index > 0]
 
 

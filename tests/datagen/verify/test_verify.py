@@ -28,8 +28,8 @@ from datagen.formats import (
 )
 from datagen.ground_truth.labels import forward_differences, gradient_validity
 from datagen.recipe.recipe import read_recipe
+from datagen.verify.dataset_check import FEW_SCENES, verify_dataset
 from datagen.verify.report import VerifyReport
-from datagen.verify.run import FEW_SCENES, verify_dataset
 from tests.datagen.analytic_world import commit, write_dataset
 
 
@@ -128,13 +128,13 @@ Arrays = dict[str, NDArray[np.float32]]
 def change_disparities(root: Path, change: Callable[[Arrays], Arrays]) -> None:
     """Change the disparities of one frame, with gradients that fit them, and commit the scene again."""
     layout = Layout(root)
-    paths = {eye: layout.file("disparity", "train", 0, eye, 6) for eye in ("left", "right")}
-    for eye, disparity in change({eye: read_pfm(path) for eye, path in paths.items()}).items():
-        write_pfm(paths[eye], disparity)
+    paths = {view: layout.file("disparity", "train", 0, view, 6) for view in ("left", "right")}
+    for view, disparity in change({view: read_pfm(path) for view, path in paths.items()}).items():
+        write_pfm(paths[view], disparity)
         with np.errstate(invalid="ignore"):  # Infinity minus infinity, where that is the damage.
             gradient = forward_differences(disparity)
         valid = gradient_validity(gradient, read_recipe(layout.recipe).gradient_threshold_px)
-        write_gradient(layout.file("disparity_gradient", "train", 0, eye, 6), gradient, valid)
+        write_gradient(layout.file("disparity_gradient", "train", 0, view, 6), gradient, valid)
     commit_again(root)
 
 
@@ -155,24 +155,27 @@ def shift_half_a_pixel(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
     return (disparity + np.roll(disparity, -1, axis=1)) / np.float32(2)
 
 
-BOTH_EYES = ("left", "right")
+BOTH_VIEWS = ("left", "right")
 WRONG: dict[str, tuple[Callable[[Arrays], Arrays], str]] = {
     "views swapped": (lambda a: {"left": a["right"], "right": a["left"]}, "from the scene's geometry"),
-    "sign turned": (lambda a: {eye: -a[eye] for eye in BOTH_EYES}, "disparities are negative"),
+    "sign turned": (lambda a: {view: -a[view] for view in BOTH_VIEWS}, "disparities are negative"),
     "sampled half a pixel off": (
-        lambda a: {eye: shift_half_a_pixel(a[eye]) for eye in BOTH_EYES},
+        lambda a: {view: shift_half_a_pixel(a[view]) for view in BOTH_VIEWS},
         "from the scene's geometry",
     ),
     "half a pixel too much": (
-        lambda a: {eye: a[eye] + np.float32(0.5) for eye in BOTH_EYES},
+        lambda a: {view: a[view] + np.float32(0.5) for view in BOTH_VIEWS},
         "from the scene's geometry",
     ),
     "one view half a pixel too much": (
         lambda a: {"left": a["left"] + np.float32(0.5)},
         "visible pixels have another disparity than the other view",
     ),
-    "baseline doubled": (lambda a: {eye: 2 * a[eye] for eye in BOTH_EYES}, "from the scene's geometry"),
-    "upside down": (lambda a: {eye: a[eye][::-1].copy() for eye in BOTH_EYES}, "from the scene's geometry"),
+    "baseline doubled": (lambda a: {view: 2 * a[view] for view in BOTH_VIEWS}, "from the scene's geometry"),
+    "upside down": (
+        lambda a: {view: a[view][::-1].copy() for view in BOTH_VIEWS},
+        "from the scene's geometry",
+    ),
     "not finite": (
         lambda a: {"left": np.where(a["left"] > 15, np.float32("nan"), a["left"])},
         "disparities are not finite",
@@ -201,19 +204,19 @@ def test_disparity_of_another_size(own_dataset: Path) -> None:
 
 def test_all_images_of_another_size_than_the_camera(own_dataset: Path) -> None:
     layout = Layout(own_dataset)
-    for eye in BOTH_EYES:
+    for view in BOTH_VIEWS:
         for kind in ("frames_cleanpass", "object_index"):
-            path = layout.file(kind, "train", 0, eye, 6)
+            path = layout.file(kind, "train", 0, view, 6)
             write_png(path, read_png(path)[:-1])
-        path = layout.file("occlusion", "train", 0, eye, 6)
+        path = layout.file("occlusion", "train", 0, view, 6)
         write_occlusion(path, read_occlusion(path)[:-1])
-    change_disparities(own_dataset, lambda arrays: {eye: array[:-1] for eye, array in arrays.items()})
+    change_disparities(own_dataset, lambda arrays: {view: array[:-1] for view, array in arrays.items()})
     assert "is (63, 96) where the scene's camera makes (64, 96)" in messages(verify_dataset(own_dataset))
 
 
 def test_images_swapped(own_dataset: Path) -> None:
     layout = Layout(own_dataset)
-    left, right = (layout.file("frames_cleanpass", "train", 0, eye, 6) for eye in BOTH_EYES)
+    left, right = (layout.file("frames_cleanpass", "train", 0, view, 6) for view in BOTH_VIEWS)
     left_bytes, right_bytes = left.read_bytes(), right.read_bytes()
     left.write_bytes(right_bytes)
     right.write_bytes(left_bytes)
@@ -241,9 +244,9 @@ def test_occlusion_against_disparity(own_dataset: Path) -> None:
     for changed, says in (
         (np.where(labels == 1, 0, labels), "sampled occlusion labels are not those of the scene"),
         (np.where(labels == 1, 0, 1), "visible pixels have another disparity than the other view"),
-        (np.where(labels == 2, 1, labels), "are labelled against where their disparity puts them"),
-        (np.where(labels == 0, 1, labels), "occluded pixels have nothing nearer before them"),
-        (labels[:, ::-1].copy(), "are labelled against where their disparity puts them"),
+        (np.where(labels == 2, 1, labels), "have a label that contradicts their place"),
+        (np.where(labels == 0, 1, labels), "occluded pixels have nothing nearer in front of them"),
+        (labels[:, ::-1].copy(), "have a label that contradicts their place"),
     ):
         write_occlusion(path, changed.astype(np.uint8))
         commit_again(own_dataset)
@@ -327,7 +330,7 @@ def test_processes_of_their_own_find_the_same(tmp_path: Path) -> None:
 
 
 def test_without_rays_the_geometry_is_left_out_and_nothing_else(own_dataset: Path) -> None:
-    change_disparities(own_dataset, lambda arrays: {eye: array * 0 for eye, array in arrays.items()})
+    change_disparities(own_dataset, lambda arrays: {view: array * 0 for view, array in arrays.items()})
     assert "from the scene's geometry" in messages(verify_dataset(own_dataset))
     without = messages(verify_dataset(own_dataset, sampled_pixels=0))
     assert "geometry" not in without

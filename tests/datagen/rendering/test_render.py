@@ -40,7 +40,7 @@ def test_same_recipe_same_bytes_with_other_workers(reference: Path, tmp_path: Pa
 def test_killed_run_continues_to_the_same_bytes(reference: Path, tmp_path: Path) -> None:
     root = tmp_path / "set"
     code = (
-        "from tests.datagen.test_render import RECIPE\nfrom datagen import render_dataset\n"
+        "from tests.datagen.rendering.test_render import RECIPE\nfrom datagen import render_dataset\n"
         f"if __name__ == '__main__':\n    render_dataset(RECIPE, {str(root)!r}, workers=1)\n"
     )
     script = tmp_path / "run.py"
@@ -77,7 +77,7 @@ def test_a_finished_set_renders_nothing_and_can_grow(reference: Path, tmp_path: 
 
 def test_a_process_in_which_blender_runs_can_still_spawn_workers(tmp_path: Path) -> None:
     code = (
-        "from tests.datagen.test_render import RECIPE, replace, render_dataset\n"
+        "from tests.datagen.rendering.test_render import RECIPE, replace, render_dataset\n"
         "if __name__ == '__main__':\n    import bpy\n"
         f"    summary = render_dataset(replace(RECIPE, scenes={{'test': 1}}), {str(tmp_path / 'set')!r}, workers=1)\n"
         "    assert summary.rendered == 1, summary\n"

@@ -15,15 +15,15 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
 from datagen import DatasetError, Recipe, StereoDataset, StereoSample, render_dataset
-from datagen.dataset.layout import DIRECTIONS, EXTRA_TARGETS, EYES, Direction, Eye, Layout
+from datagen.dataset.layout import DIRECTIONS, EXTRA_TARGETS, VIEWS, Direction, Layout, View
 from datagen.dataset.manifest import file_entry, read_manifest, write_manifest
 from datagen.formats import write_flow, write_mask, write_normals, write_pfm, write_png
 from datagen.gallery.page import write_gallery
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
-from datagen.ground_truth.targets import STEP, ExtraTargets, PixelSurfaces
+from datagen.ground_truth.scene_geometry import build_geometry
+from datagen.ground_truth.targets import STEP, ExtraTargets, PixelSurfaces, find_surfaces
 from datagen.recipe.recipe import read_recipe, recipe_to_text
-from datagen.verify.run import verify_dataset
+from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, Scene
 from scenes.motion.trajectories import quaternion
 from scenes.shapes.solids.basic import Plane
@@ -101,20 +101,20 @@ class Expected:
     normal: NDArray[np.float64]
 
 
-def closed_form(stretch: NDArray[np.float64], eye: Eye, step: float, centre: float = 0.5) -> Expected:
+def closed_form(stretch: NDArray[np.float64], view: View, step: float, centre: float = 0.5) -> Expected:
     """Where the plane's points and the sky go from frame `NOW` on, from the motions' own formulas."""
     columns, rows = np.meshgrid(np.arange(WIDTH) + centre, np.arange(HEIGHT) + centre)
     rays = np.stack(
         [(columns - WIDTH / 2) / FOCAL_PX, (HEIGHT / 2 - rows) / FOCAL_PX, -np.ones_like(rows)], -1
     )
-    spans, middle = plane_seen(stretch, eye, NOW)
+    spans, middle = plane_seen(stretch, view, NOW)
     # The ray meets middle + u spans_x + v spans_y: three linear equations in (depth, u, v).
     system = np.concatenate([rays[..., None], np.broadcast_to(-spans, (*rays.shape[:2], 3, 2))], -1)
     depth, u, v = np.moveaxis(
         np.linalg.solve(system, np.broadcast_to(middle, rays.shape)[..., None])[..., 0], -1, 0
     )
     hit = (np.abs(u) <= 1) & (np.abs(v) <= 1) & (depth > 0)
-    spans_then, middle_then = plane_seen(stretch, eye, NOW + step)
+    spans_then, middle_then = plane_seen(stretch, view, NOW + step)
     there = middle_then + np.stack([u, v], -1) @ spans_then.T
     camera_now, camera_then = RIG.at(NOW)[0], RIG.at(NOW + step)[0]
     there = np.where(hit[..., None], there, rays @ camera_now.T @ camera_then)
@@ -127,30 +127,30 @@ def closed_form(stretch: NDArray[np.float64], eye: Eye, step: float, centre: flo
 
 
 def plane_seen(
-    stretch: NDArray[np.float64], eye: Eye, time: float
+    stretch: NDArray[np.float64], view: View, time: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """In the eye's frame: (3, 2) images of the plane's half axes, and its centre."""
+    """In the view's frame: (3, 2) images of the plane's half axes, and its centre."""
     turn, position = PLANE.at(time)
     axes = turn @ np.diag((PLANE_HALF_M, PLANE_HALF_M, 1.0)) @ (np.eye(3) + time * stretch)[:, :2]
     camera, place = RIG.at(time)
-    place = place + (BASELINE_M * camera[:, 0] if eye == "right" else 0.0)
+    place = place + (BASELINE_M * camera[:, 0] if view == "right" else 0.0)
     return camera.T @ axes, camera.T @ (position - place)
 
 
-def surfaces(scene: Scene, eye: Eye, time: float = NOW) -> PixelSurfaces:
-    geometry = SceneGeometry(scene)
+def surfaces(scene: Scene, view: View, time: float = NOW) -> PixelSurfaces:
+    geometry = build_geometry(scene)
     rows, columns = np.indices((scene.camera.height, scene.camera.width))
-    return PixelSurfaces(SceneRayCaster(geometry), eye, time, rows, columns)
+    return find_surfaces(SceneRayCaster(geometry), view, time, rows, columns)
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
-@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_flow_disparity_change_and_normals_have_their_closed_form(
-    kind: str, eye: Eye, direction: Direction
+    kind: str, view: View, direction: Direction
 ) -> None:
     stretch = KINDS[kind]
-    found, expected = surfaces(moving_plane(stretch), eye), closed_form(stretch, eye, STEP[direction])
+    found, expected = surfaces(moving_plane(stretch), view), closed_form(stretch, view, STEP[direction])
     assert 0.3 < expected.hit.mean() < 0.95
     # Pixels on the plane's rim may fall to either side.
     rim = np.zeros_like(expected.hit)
@@ -160,19 +160,19 @@ def test_flow_disparity_change_and_normals_have_their_closed_form(
         )
     flow = found.flow(direction)
     error = np.linalg.norm(flow - expected.flow, axis=-1)[~rim]
-    print(f"{kind} {eye} {direction}: flow p99.9 {np.percentile(error, 99.9):.2e}, max {error.max():.2e} px")
+    print(f"{kind} {view} {direction}: flow p99.9 {np.percentile(error, 99.9):.2e}, max {error.max():.2e} px")
     assert np.percentile(error, 99.9) < TOLERANCE_PX
     assert np.abs(found.disparity_change(direction) - expected.disparity_change)[~rim].max() < TOLERANCE_PX
     normals = found.normals()[expected.hit & ~rim]
     assert np.abs(normals - expected.normal).max() < 1e-5
-    # What would be wrong: half a pixel, the sign, the direction, the other eye, a forgotten deformation.
-    other_eye: Eye = "right" if eye == "left" else "left"
+    # What would be wrong: half a pixel, the sign, the direction, the other view, a forgotten deformation.
+    other_view: View = "right" if view == "left" else "left"
     wrong = {
-        "half a pixel": closed_form(stretch, eye, STEP[direction], centre=0.0).flow,
+        "half a pixel": closed_form(stretch, view, STEP[direction], centre=0.0).flow,
         "sign": -expected.flow,
-        "direction": closed_form(stretch, eye, -STEP[direction]).flow,
-        "eye": closed_form(stretch, other_eye, STEP[direction]).flow,
-        "shape": closed_form(0.5 * stretch + 0.01, eye, STEP[direction]).flow,
+        "direction": closed_form(stretch, view, -STEP[direction]).flow,
+        "view": closed_form(stretch, other_view, STEP[direction]).flow,
+        "shape": closed_form(0.5 * stretch + 0.01, view, STEP[direction]).flow,
     }
     for name, other in wrong.items():
         assert np.percentile(np.linalg.norm(flow - other, axis=-1)[~rim], 50) > TOLERANCE_PX, name
@@ -189,7 +189,7 @@ def test_only_what_was_asked_for_is_made(kinds: tuple[str, ...], monkeypatch: py
         return flow(surfaces, direction)
 
     monkeypatch.setattr(PixelSurfaces, "flow", counted)
-    caster = SceneRayCaster(SceneGeometry(moving_plane(KINDS["rigid"])))
+    caster = SceneRayCaster(build_geometry(moving_plane(KINDS["rigid"])))
     index = caster.cast_all("left", NOW).object_index
     made = ExtraTargets(caster, kinds).make("left", NOW, index)
     assert {kind for kind, _ in made} == set(kinds)
@@ -226,38 +226,38 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def warp_errors(
-    here: StereoSample, there: StereoSample, flow: NDArray[np.float32], eye: Eye
+    here: StereoSample, there: StereoSample, flow: NDArray[np.float32], view: View
 ) -> NDArray[np.float64]:
     """(H, W) mean squared difference, levels^2, of one picture and the other one fetched along the flow."""
     rows, columns = np.indices(here.size)
     where = [rows + flow[..., 1], columns + flow[..., 0]]
-    picture = there.view(eye).image
+    picture = there.view(view).image
     fetched = [
         map_coordinates(picture[..., c].astype(float), where, order=1, mode="nearest") for c in range(3)
     ]
-    return ((np.stack(fetched, -1) - here.view(eye).image) ** 2).mean(axis=-1)
+    return ((np.stack(fetched, -1) - here.view(view).image) ** 2).mean(axis=-1)
 
 
 def psnr(errors: NDArray[np.float64]) -> float:
     return float(10 * np.log10(255**2 / errors.mean()))
 
 
-@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("view", VIEWS)
 def test_warping_the_next_frame_by_the_flow_gives_this_one_where_it_is_visible(
-    dataset: Path, eye: Eye
+    dataset: Path, view: View
 ) -> None:
     first, second = StereoDataset(dataset, "train")
     for here, there, direction in ((first, second, "into_future"), (second, first, "into_past")):
-        flow = here.flow(eye, direction)
+        flow = here.flow(view, direction)
         height, width = here.size
         rows, columns = np.indices(here.size)
         x, y = columns + flow[..., 0], rows + flow[..., 1]
         inside = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
         # Visible: the disparity that the point will have is found where the point will be.
-        expected = here.view(eye).disparity + here.disparity_change(eye, direction)
+        expected = here.view(view).disparity + here.disparity_change(view, direction)
         around = np.stack(
             [
-                there.view(eye).disparity[
+                there.view(view).disparity[
                     np.clip(np.floor(y).astype(int) + i, 0, height - 1),
                     np.clip(np.floor(x).astype(int) + j, 0, width - 1),
                 ]
@@ -267,16 +267,16 @@ def test_warping_the_next_frame_by_the_flow_gives_this_one_where_it_is_visible(
         )
         low, high = around.min(axis=0), around.max(axis=0)
         visible = inside & (high - low < 0.5) & (expected > low - 0.02) & (expected < high + 0.02)
-        hidden = inside & (low > expected + 0.5)
-        errors = warp_errors(here, there, flow, eye)
-        turned = warp_errors(here, there, -flow, eye)
+        occluded = inside & (low > expected + 0.5)
+        errors = warp_errors(here, there, flow, view)
+        turned = warp_errors(here, there, -flow, view)
         print(
-            f"{eye} {direction}: visible {visible.mean():.1%} {psnr(errors[visible]):.1f} dB, hidden "
-            f"{hidden.mean():.1%} {psnr(errors[hidden]):.1f} dB, sign turned {psnr(turned[visible]):.1f} dB"
+            f"{view} {direction}: visible {visible.mean():.1%} {psnr(errors[visible]):.1f} dB, occluded "
+            f"{occluded.mean():.1%} {psnr(errors[occluded]):.1f} dB, sign turned {psnr(turned[visible]):.1f} dB"
         )
         assert visible.mean() > 0.5
         assert psnr(errors[visible]) > 25
-        assert psnr(errors[hidden]) < psnr(errors[visible]) - 6
+        assert psnr(errors[occluded]) < psnr(errors[visible]) - 6
         assert psnr(turned[visible]) < psnr(errors[visible]) - 3
 
 
@@ -284,21 +284,21 @@ def test_all_targets_are_there_and_agree_among_themselves(dataset: Path) -> None
     assert verify_dataset(dataset, workers=1).problems == ()
     for sample in StereoDataset(dataset, "train"):
         materials = np.array([0, *(1 + thing.material for thing in sample.scene_record.objects)])
-        for eye in EYES:
-            view = sample.view(eye)
-            assert np.array_equal(sample.material_index(eye), materials[view.object_index])
-            length = np.linalg.norm(sample.normals(eye), axis=-1)
-            assert (np.abs(length[view.object_index > 0] - 1) < 1e-5).mean() > 0.99  # silhouettes are ties
-            assert (length[view.object_index == 0] == 0).mean() > 0.99
+        for view in VIEWS:
+            arrays = sample.view(view)
+            assert np.array_equal(sample.material_index(view), materials[arrays.object_index])
+            length = np.linalg.norm(sample.normals(view), axis=-1)
+            assert (np.abs(length[arrays.object_index > 0] - 1) < 1e-5).mean() > 0.99  # silhouettes are ties
+            assert (length[arrays.object_index == 0] == 0).mean() > 0.99
             for direction in DIRECTIONS:
-                flow, marked = sample.flow(eye, direction), sample.motion_boundaries(eye, direction)
+                flow, marked = sample.flow(view, direction), sample.motion_boundaries(view, direction)
                 assert 0 < marked.mean() < 0.3
                 # Inside one object the flow is smooth; marked pixels touch another object.
-                index = np.pad(view.object_index.astype(int), 1, mode="edge")
+                index = np.pad(arrays.object_index.astype(int), 1, mode="edge")
                 touching = np.zeros(sample.size, bool)
                 for rows, columns in ((0, 1), (2, 1), (1, 0), (1, 2)):
                     shifted = index[rows : rows + sample.size[0], columns : columns + sample.size[1]]
-                    touching |= shifted != view.object_index
+                    touching |= shifted != arrays.object_index
                 assert (touching[marked]).mean() > 0.99
                 assert np.isfinite(flow).all()
 
@@ -371,7 +371,7 @@ def test_motion_boundaries_are_verified_without_stored_flow_too(
     write_mask(Layout(root).file("motion_boundaries", "train", 0, "left", sample.frame, "into_past"), wrong)
     commit_again(root)
     (problem,) = verify_dataset(root, workers=1).problems
-    assert "pixels of motion boundaries are marked otherwise than the scene's geometry says" in str(problem)
+    assert "pixels of motion boundaries differ from the scene's geometry" in str(problem)
 
 
 @pytest.mark.parametrize("kind", EXTRA_TARGETS)
@@ -405,15 +405,15 @@ def test_objects_beyond_the_scene_are_a_problem_and_no_crash(dataset: Path, tmp_
 def test_flow_loaders_find_the_published_names(dataset: Path) -> None:
     """The globs of torchvision's FlyingThings3D and RAFT's loader: as many flows as pictures, in order."""
     for direction, towards in (("into_future", "IntoFuture"), ("into_past", "IntoPast")):
-        for eye in EYES:
-            folder = dataset / "optical_flow/TRAIN/A/0000" / direction / eye
+        for view in VIEWS:
+            folder = dataset / "optical_flow/TRAIN/A/0000" / direction / view
             names = sorted(path.name for path in folder.glob("*.pfm"))
-            assert names == [f"OpticalFlow{towards}_{k:04d}_{eye[0].upper()}.pfm" for k in (6, 7)]
+            assert names == [f"OpticalFlow{towards}_{k:04d}_{view[0].upper()}.pfm" for k in (6, 7)]
             first = (folder / names[0]).read_bytes()
             assert first.startswith(b"PF\n160 96\n-1.0\n")
             values = np.frombuffer(first[-4 * 3 * 160 * 96 :], "<f4").reshape(96, 160, 3)[::-1]
             sample = StereoDataset(dataset, "train")[0]
-            assert np.array_equal(values[..., :2], sample.flow(eye, direction))
+            assert np.array_equal(values[..., :2], sample.flow(view, direction))
             assert not values[..., 2].any()
 
 

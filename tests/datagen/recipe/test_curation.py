@@ -13,7 +13,7 @@ from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
 from datagen.dataset.samples import read_scene
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.curation import Curation, fault_before_rendering, is_textureless
 from scenes import FAMILIES, Scene, scene_to_json
 from scenes.shapes.solids.basic import Box
@@ -26,7 +26,7 @@ WALL = Plate((0.0, 0.0), 20.0, (60.0, 60.0))
 
 
 def fault(scene: Scene, curation: Curation = CURATION) -> str | None:
-    return fault_before_rendering(SceneRayCaster(SceneGeometry(scene)), curation)
+    return fault_before_rendering(SceneRayCaster(build_geometry(scene)), curation)
 
 
 def test_an_ordinary_scene_has_no_fault() -> None:
@@ -44,12 +44,12 @@ def test_one_surface_and_an_empty_view_are_found() -> None:
     assert fault(plates(192, 108, Plate((0.0, 0.0), -5.0, (1.0, 1.0)))) == "one surface fills the view"
 
 
-def test_what_the_other_eye_hardly_sees_is_found() -> None:
-    # 1 m before eyes 1 m apart: the disparity is the whole image width.
+def test_what_is_hardly_visible_in_the_other_view_is_found() -> None:
+    # 1 m before views 1 m apart: the disparity is the whole image width.
     near = Plate((0.0, 0.0), 1.01, (0.4, 9.0))
     assert (
         fault(plates(192, 108, near, WALL), Curation(max_one_object=0.95))
-        == "mostly hidden from the other eye"
+        == "mostly occluded or out of frame"
     )
 
 
@@ -90,7 +90,7 @@ def test_rejected_scenes_are_drawn_anew_and_counted(tmp_path: Path) -> None:
     first = recipe(max_one_object=0.999)
     shares = []
     for attempt in range(6):
-        caster = SceneRayCaster(SceneGeometry(first.sample("train", 0, attempt)))
+        caster = SceneRayCaster(build_geometry(first.sample("train", 0, attempt)))
         bounds = np.linspace(0.2, 1.0, 81)
         passing = [
             b for b in bounds if not fault_before_rendering(caster, replace(CURATION, max_one_object=b))

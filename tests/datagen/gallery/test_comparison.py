@@ -31,7 +31,7 @@ def test_a_set_and_its_copy_are_at_distance_0(
     assert len(set(names)) == 2
     assert all(name.endswith("/set") for name in names)
     assert page.count("<svg") == 4
-    assert page.count("Left eye of") == 12
+    assert page.count("Left view of") == 12
     assert not re.search(r"(src|href)=\"(?!data:|#)", page)
 
 

@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import datagen.recipe.disparity_histogram
+import datagen.recipe.recipe
 from datagen import DatasetError, Recipe
 from datagen.dataset.statistics import SetStatistics
 from datagen.gallery.page import histograms
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.curation import Curation
 from datagen.recipe.disparity_histogram import Component, DisparityHistogram
-from datagen.recipe.recipe import recipe_from_text, recipe_to_text
+from datagen.recipe.recipe import fit_disparities, recipe_from_text, recipe_to_text
 from scenes import FAMILIES
 
 WANTED = DisparityHistogram((2.0, 10.0, 20.0, 40.0, 60.0), (0.1, 0.5, 0.3, 0.1))
@@ -27,13 +29,13 @@ def recipe() -> Recipe:
     world = FAMILIES["flying_things"].config(
         width=320, height=180, flying_objects=(4, 6), background_objects=(6, 9)
     )
-    return Recipe(world, {"train": SCENES}, disparities=WANTED)
+    return fit_disparities(Recipe(world, {"train": SCENES}, disparities=WANTED))
 
 
 def surfaces(recipe: Recipe) -> NDArray[np.float64]:
     rows, columns = (grid.ravel() for grid in np.mgrid[3:180:7, 3:320:7])
     shown = [
-        SceneRayCaster(SceneGeometry(recipe.sample("train", number))).cast("left", 0, rows, columns)
+        SceneRayCaster(build_geometry(recipe.sample("train", number))).cast("left", 0, rows, columns)
         for number in range(recipe.scenes["train"])
     ]
     return np.concatenate([hits.disparity[hits.object_index > 0] for hits in shown])
@@ -54,6 +56,26 @@ def test_the_recipe_keeps_what_was_found_and_others_are_written_as_before(recipe
     assert again == recipe
     assert again.sample("train", 3) == recipe.sample("train", 3)
     assert "disparities" not in recipe_to_text(replace(recipe, disparities=None))
+
+
+def test_constructing_and_reading_a_recipe_samples_no_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("a scene was sampled")
+
+    for module in (datagen.recipe.recipe, datagen.recipe.disparity_histogram):
+        monkeypatch.setattr(module, "sample_scene", refuse)
+    unfitted = Recipe(FAMILIES["flying_things"].config(), {"train": SCENES}, disparities=WANTED)
+    assert recipe_from_text(recipe_to_text(unfitted).encode(), "it") == unfitted
+    with pytest.raises(ValueError, match="no components yet"):
+        unfitted.sample("train", 0)
+    with pytest.raises(AssertionError, match="a scene was sampled"):
+        fit_disparities(unfitted)
+
+
+def test_fitting_again_changes_nothing(recipe: Recipe) -> None:
+    assert fit_disparities(recipe) is recipe
+    plain = replace(recipe, disparities=None)
+    assert fit_disparities(plain) is plain
 
 
 def test_any_run_of_scenes_takes_turns_among_the_components() -> None:

@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from datagen.dataset.layout import EYES, Eye
+from datagen.dataset.layout import VIEWS, View
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
-from datagen.rendering.frames import EyeTargets, RenderOptions, render_frames
+from datagen.ground_truth.scene_geometry import build_geometry
+from datagen.rendering.frames import RenderOptions, ViewTargets, render_frames
 from scenes import Scene
 from scenes.motion.deformations.sway import Sway
 from scenes.motion.trajectories import quaternion
@@ -52,7 +52,7 @@ def make_scene() -> Scene:
     return replace(scene, frames=FRAMES, objects=(*scene.objects, *instances, *swaying))
 
 
-Frames = list[tuple[dict[Eye, EyeTargets], NDArray[np.float64]]]
+Frames = list[tuple[dict[View, ViewTargets], NDArray[np.float64]]]
 
 
 @pytest.fixture(scope="module")
@@ -69,35 +69,35 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Frames, i
 
 
 @pytest.mark.parametrize("frame", range(FRAMES))
-@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("view", VIEWS)
 def test_every_frame_shows_the_shapes_of_its_instant(
-    rendered: tuple[Scene, Frames, int], frame: int, eye: Eye
+    rendered: tuple[Scene, Frames, int], frame: int, view: View
 ) -> None:
     scene, frames, _ = rendered
     targets, blenders_triangles = frames[frame]
-    own = SceneGeometry(scene)
+    own = build_geometry(scene)
     camera = scene.camera
     for corners in (own.vertices(frame)[own.triangles], blenders_triangles):
-        triangles = to_camera_frame(corners, camera.pose(eye, frame))
+        triangles = to_camera_frame(corners, camera.pose(view, frame))
         depth = cast_depth(triangles, camera.width, camera.height, camera.focal_px)
-        error = np.abs(targets[eye].disparity - camera.disparity_metres / depth)
+        error = np.abs(targets[view].disparity - camera.disparity_metres / depth)
         assert np.percentile(error, 99.5) < 1e-3
     # The other frames' shapes do not fit.
-    stale = to_camera_frame(own.vertices((frame + 1) % FRAMES)[own.triangles], camera.pose(eye, frame))
+    stale = to_camera_frame(own.vertices((frame + 1) % FRAMES)[own.triangles], camera.pose(view, frame))
     depth = cast_depth(stale, camera.width, camera.height, camera.focal_px)
-    error = np.abs(targets[eye].disparity - camera.disparity_metres / depth)
+    error = np.abs(targets[view].disparity - camera.disparity_metres / depth)
     assert np.percentile(error, 95) > 0.01
 
 
 def test_labels_and_occlusion_follow_the_deformed_shapes(rendered: tuple[Scene, Frames, int]) -> None:
     scene, frames, _ = rendered
-    caster = SceneRayCaster(SceneGeometry(scene))
+    caster = SceneRayCaster(build_geometry(scene))
     rows, columns = (grid.ravel() for grid in np.mgrid[:HEIGHT, :WIDTH])
     for frame, (targets, _) in enumerate(frames):
-        for eye in EYES:
-            hits = caster.cast(eye, frame, rows, columns)
-            assert (targets[eye].object_index.ravel() == hits.object_index).mean() > 0.995
-            assert (targets[eye].occlusion.ravel() == hits.occlusion).mean() > 0.99
+        for view in VIEWS:
+            hits = caster.cast(view, frame, rows, columns)
+            assert (targets[view].object_index.ravel() == hits.object_index).mean() > 0.995
+            assert (targets[view].occlusion.ravel() == hits.occlusion).mean() > 0.99
 
 
 def test_rigid_objects_of_one_shape_and_material_share_a_mesh(rendered: tuple[Scene, Frames, int]) -> None:
@@ -117,7 +117,7 @@ def test_a_frame_looks_the_same_whatever_was_rendered_before(
     radiance = []
     for frames in ((2,), (0, 2)):
         with quiet(tmp_path / "log"):
-            world = build_world(SceneGeometry(rendered[0]), start_empty_file(CyclesSettings(samples=1)))
+            world = build_world(build_geometry(rendered[0]), start_empty_file(CyclesSettings(samples=1)))
             views = [render_view(world, "left", frame, tmp_path) for frame in frames]
         radiance.append(views[-1])
     assert np.array_equal(*radiance)
