@@ -12,6 +12,7 @@ from scenes.random_draws import Count, Range
 from scenes.spec import Scene
 from scenes.user_assets.pool import AssetPool
 from scenes.user_assets.replacement import Replaceable
+from stereoforge_kit.errors import InputError
 
 EMPTIEST = 0.1
 """What is left of a family's crowd at complexity 0."""
@@ -50,15 +51,15 @@ class FamilyConfig:
             given = getattr(self, name)
             values = given if isinstance(given, tuple) else (given,)
             if not np.isfinite(values).all():
-                raise ValueError(f"{name} must be finite, got {given}")
+                raise InputError(f"{name} must be finite, got {given}")
             if kind in (Range, Count) and values[0] > values[1]:
-                raise ValueError(f"{name} must be (low, high), got {given}")
+                raise InputError(f"{name} must be (low, high), got {given}")
             if kind == Count and values[0] < 0:
-                raise ValueError(f"{name} must not be negative, got {given}")
+                raise InputError(f"{name} must not be negative, got {given}")
             if kind is float and name.endswith("_share") and not 0 <= given <= 1:
-                raise ValueError(f"{name} must be in 0..1, got {given}")
+                raise InputError(f"{name} must be in 0..1, got {given}")
         if self.frames < 1:
-            raise ValueError(f"frames must be at least 1, got {self.frames}")
+            raise InputError(f"frames must be at least 1, got {self.frames}")
 
     def with_assets(self, assets: AssetPool) -> Self:  # noqa: ARG002
         """This config with the user's files, for a family that draws them while it samples.
@@ -74,7 +75,7 @@ class FamilyConfig:
         Raises ValueError for a range that the family's worlds cannot have.
         """
         if least_px > 0:
-            raise ValueError(
+            raise InputError(
                 f"worlds of {type(self).__name__} reach to the horizon, so the least disparity can only be 0, "
                 f"not {least_px:g}"
             )
@@ -86,9 +87,9 @@ class FamilyConfig:
         Raises ValueError for a complexity outside 0..1, or for a family that names nothing to have fewer of.
         """
         if not 0 <= complexity <= 1:
-            raise ValueError(f"complexity must be from 0 to 1, got {complexity}")
+            raise InputError(f"complexity must be from 0 to 1, got {complexity}")
         if complexity < 1 and not self.crowd and not self.sparsity:
-            raise ValueError(f"{type(self).__name__} names no crowd that a curriculum could make smaller")
+            raise InputError(f"{type(self).__name__} names no crowd that a curriculum could make smaller")
         factor = crowd_share(complexity)
         changes: dict[str, Any] = {name: _scaled(getattr(self, name), factor) for name in self.crowd}
         changes |= {name: _scaled(getattr(self, name), 1 / factor) for name in self.sparsity}

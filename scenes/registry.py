@@ -10,6 +10,7 @@ from scenes.family import Family, FamilyConfig
 from scenes.spec import Scene
 from scenes.user_assets.pool import AssetPool
 from scenes.user_assets.replacement import with_user_assets
+from stereoforge_kit.errors import InputError
 
 FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in modules_in(scenes.families)}
 """Every family by name."""
@@ -25,11 +26,11 @@ def sample_scene(
     another family.
     """
     if family not in FAMILIES:
-        raise ValueError(f"there is no scene family {family!r}; there are {', '.join(sorted(FAMILIES))}")
+        raise InputError(f"there is no scene family {family!r}; there are {', '.join(sorted(FAMILIES))}")
     kind = FAMILIES[family]
     config = kind.config() if config is None else config
     if not isinstance(config, kind.config):
-        raise ValueError(f"{family} takes a {kind.config.__name__}, not a {type(config).__name__}")
+        raise InputError(f"{family} takes a {kind.config.__name__}, not a {type(config).__name__}")
     assets = AssetPool() if assets is None else assets
     scene = kind.sample(rng, config.with_assets(assets))
     return with_user_assets(rng, scene, assets, kind.replaceable) if kind.replaceable else scene

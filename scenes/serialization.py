@@ -24,6 +24,7 @@ from scenes.family import FamilyConfig
 from scenes.registry import FAMILIES
 from scenes.spec import Deformation, Light, Scene, Shape, Texture
 from scenes.user_assets.pool import USER_SHAPES, USER_TEXTURES
+from stereoforge_kit.errors import InputError
 
 T = TypeVar("T")
 
@@ -38,7 +39,7 @@ def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str
     def structure(data: Any, _: Any) -> Any:
         kind = kinds.get(str(data.get(tag))) if isinstance(data, dict) else None
         if kind is None:
-            raise ValueError(
+            raise InputError(
                 f"a {base.__name__} needs {tag!r}, one of {', '.join(kinds)}; got {str(data)[:80]!r}"
             )
         return converter.structure({key: value for key, value in data.items() if key != tag}, kind)
@@ -97,9 +98,9 @@ def from_plain(data: Any, kind: type[T]) -> T:
         return _converter.structure(data, kind)
     except ClassValidationError as error:
         sentences = transform_error(error, path=kind.__name__, format_exception=_describe)
-        raise ValueError("; ".join(sentences)) from error
+        raise InputError("; ".join(sentences)) from error
     except (TypeError, KeyError, AttributeError) as error:
-        raise ValueError(f"{kind.__name__}: {error}") from error
+        raise InputError(f"{kind.__name__}: {error}") from error
 
 
 def _describe(error: BaseException, kind: type | None) -> str:
@@ -121,5 +122,5 @@ def scene_from_json(text: str) -> Scene:
     try:
         data = json.loads(text)
     except json.JSONDecodeError as error:
-        raise ValueError(f"not JSON: {error}") from error
+        raise InputError(f"not JSON: {error}") from error
     return from_plain(data, Scene)

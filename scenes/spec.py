@@ -24,6 +24,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from scenes.geometry.mesh import Mesh
+from stereoforge_kit.errors import InputError
 
 Vector = tuple[float, float, float]
 Color = tuple[float, float, float]
@@ -130,12 +131,12 @@ class Trajectory:
     def __post_init__(self) -> None:
         count = len(self.times_frames)
         if count == 0 or len(self.positions_m) != count or len(self.rotations) != count:
-            raise ValueError(
+            raise InputError(
                 f"a trajectory needs as many positions and rotations as times, and at least one; got "
                 f"{count} times, {len(self.positions_m)} positions, {len(self.rotations)} rotations"
             )
         if any(b <= a for a, b in zip(self.times_frames, self.times_frames[1:], strict=False)):
-            raise ValueError("a trajectory's times must increase")
+            raise InputError("a trajectory's times must increase")
 
     @classmethod
     def static(cls, position_m: Vector = (0.0, 0.0, 0.0), rotation: Quaternion = IDENTITY_ROTATION) -> Self:
@@ -212,7 +213,7 @@ class StereoCamera:
     def __post_init__(self) -> None:
         for name in ("width", "height", "focal_mm", "baseline_m", "sensor_width_mm"):
             if not getattr(self, name) > 0:
-                raise ValueError(f"a camera's {name} must be positive, got {getattr(self, name)}")
+                raise InputError(f"a camera's {name} must be positive, got {getattr(self, name)}")
 
     @property
     def focal_px(self) -> float:
@@ -230,7 +231,7 @@ class StereoCamera:
         if view == "right":
             pose[:3, 3] += pose[:3, 0] * self.baseline_m
         elif view != "left":
-            raise ValueError(f"a view is 'left' or 'right', not {view!r}")
+            raise InputError(f"a view is 'left' or 'right', not {view!r}")
         return pose
 
 
@@ -324,6 +325,6 @@ class Scene:
     def __post_init__(self) -> None:
         for thing in self.objects:
             if not 0 <= thing.material < len(self.materials):
-                raise ValueError(
+                raise InputError(
                     f"object {thing.name!r} has material {thing.material} of {len(self.materials)}"
                 )

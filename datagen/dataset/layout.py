@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Literal
 
 from datagen.errors import DatasetError
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import LocalTree, Tree
 
 SPLITS = ("train", "val", "test")
@@ -119,12 +120,12 @@ class Layout:
         if not entry.per_view:
             return folder / f"{entry.folder}{entry.extension}"
         if view not in VIEWS or frame is None or frame < FIRST_FRAME:
-            raise ValueError(
+            raise InputError(
                 f"a file of {kind} needs a view, left or right, and a frame from {FIRST_FRAME} up, "
                 f"got {view!r} and {frame}"
             )
         if direction not in entry.directions:
-            raise ValueError(f"a file of {kind} has no direction {direction!r}")
+            raise InputError(f"a file of {kind} has no direction {direction!r}")
         name = _number(frame)
         if kind == "optical_flow":
             towards = "IntoFuture" if direction == "into_future" else "IntoPast"
@@ -188,5 +189,5 @@ def scene_numbers(names: Iterable[str]) -> list[int]:
 
 def _number(value: int) -> str:
     if value < 0:
-        raise ValueError(f"scenes and frames are numbered from 0, got {value}")
+        raise InputError(f"scenes and frames are numbered from 0, got {value}")
     return f"{value:04d}"

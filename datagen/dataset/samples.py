@@ -29,6 +29,7 @@ from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.png import read_png_size
 from scenes import Scene, scene_from_json
 from scenes.user_assets.pool import use_store
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import LocalTree, open_tree
 
 
@@ -146,7 +147,7 @@ class StereoSample:
     def view(self, view: View) -> SampleView:
         """All arrays of the "left" or "right" view. Raises ValueError for another name."""
         if view not in VIEWS:
-            raise ValueError(f"a view is 'left' or 'right', not {view!r}")
+            raise InputError(f"a view is 'left' or 'right', not {view!r}")
         return SampleView(
             image=getattr(self, view),
             disparity=getattr(self, f"disparity_{view}"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from stereoforge_kit.errors import InputError
+
 ELEVATION_DEG = (-24.9, 2.0)
 """Lowest and highest beam of KITTI's scanner, a Velodyne HDL-64E."""
 AZIMUTH_STEP_DEG = 0.18
@@ -26,7 +28,7 @@ def lidar_mask(height: int, width: int, focal_px: float, beams: int) -> NDArray[
         ValueError: For fewer than one beam.
     """
     if beams < 1:
-        raise ValueError(f"a laser scanner has at least one beam, got {beams}")
+        raise InputError(f"a laser scanner has at least one beam, got {beams}")
     half_field = np.degrees(np.arctan2(width / 2, focal_px))
     azimuth = np.radians(np.arange(-half_field, half_field, AZIMUTH_STEP_DEG))
     elevation = np.radians(np.linspace(*ELEVATION_DEG, beams))

@@ -18,6 +18,7 @@ from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.errors import DatasetError
 from datagen.recipe.recipe import read_recipe, recipe_to_text
 from datagen.sources.webdataset import INDEX_NAME, META
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import Tree
 
 
@@ -40,7 +41,7 @@ def export_webdataset(
         DatasetError: For damaged files, or a recipe that is not that of the scenes.
     """
     if frames_per_shard < 1:
-        raise ValueError(f"a shard holds at least one frame, got {frames_per_shard}")
+        raise InputError(f"a shard holds at least one frame, got {frames_per_shard}")
     total, done = sum(map(len, sets)), 0
     index: dict[str, list[str]] = {}
     files: list[FileEntry] = []

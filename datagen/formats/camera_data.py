@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats.limits import read_bounded
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_bytes
 
 Matrix = NDArray[np.float64]
@@ -89,10 +90,10 @@ def _matrix(path: Path, frame: int, view: str, line: str) -> Matrix:
     words = line.split()
     try:
         if words[0] != view:
-            raise ValueError(f"it begins with {words[0][:20]!r}")
+            raise InputError(f"it begins with {words[0][:20]!r}")
         matrix = np.array([float(word) for word in words[1:]]).reshape(4, 4)
         if not np.isfinite(matrix).all():
-            raise ValueError("it is not finite")
+            raise InputError("it is not finite")
     except ValueError as error:
         raise FormatError(f"{path}: frame {frame} has no valid {view!r} matrix: {error}") from error
     return matrix

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats.limits import check_image_size, read_bounded
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import replacing
 
 _MAGIC_AND_VERSION = struct.pack("<II", 20000630, 2)
@@ -112,7 +113,7 @@ def _parse_attributes(data: bytes) -> tuple[dict[str, bytes], int]:
         end = type_end + 5 + size
         name, kind = data[position:name_end].decode("ascii"), data[name_end + 1 : type_end].decode("ascii")
         if _ATTRIBUTE_TYPES.get(name) != kind or name in attributes or end >= len(data):
-            raise ValueError(f"attribute {name!r} is unknown, repeated or too long")
+            raise InputError(f"attribute {name!r} is unknown, repeated or too long")
         attributes[name] = data[type_end + 5 : end]
         position = end
     return attributes, position + 1

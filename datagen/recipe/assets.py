@@ -25,6 +25,7 @@ from datagen.executors import LocalExecutor, WorkerPolicy
 from datagen.formats.limits import check_image_size
 from scenes.geometry.building import solid
 from scenes.user_assets.pool import Asset, AssetPool
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.processes import Limits
 
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
@@ -146,19 +147,19 @@ def prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
         loaded = trimesh.load(file, file_type=path.suffix[1:].lower(), force="mesh", process=False, **options)
     vertices, triangles = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64)
     if len(triangles) < 4:
-        raise ValueError(f"it has {len(triangles)} triangles, too few for a thing")
+        raise InputError(f"it has {len(triangles)} triangles, too few for a thing")
     if len(triangles) > MAX_TRIANGLES:
-        raise ValueError(f"it has {len(triangles)} triangles, more than {MAX_TRIANGLES}")
+        raise InputError(f"it has {len(triangles)} triangles, more than {MAX_TRIANGLES}")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise ValueError("its triangles name vertices that are not there")
+        raise InputError("its triangles name vertices that are not there")
     triangles = triangles[np.isfinite(vertices).all(axis=1)[triangles].all(axis=1)]
     used, triangles = np.unique(triangles, return_inverse=True)
     vertices, triangles = vertices[used], triangles.reshape(-1, 3)
     if not len(triangles) or np.sort(np.ptp(vertices, axis=0))[1] == 0:
-        raise ValueError("it has no surface")
+        raise InputError("it has no surface")
     mesh = solid(vertices, triangles, smooth=True)
     if len(mesh.triangles) < 4:
-        raise ValueError("its triangles have no area")
+        raise InputError("its triangles have no area")
     return {"vertices": mesh.vertices, "triangles": mesh.triangles, "corner_uv": mesh.corner_uv}
 
 
@@ -169,7 +170,7 @@ def prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
     """
     image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR)
     if image is None:
-        raise ValueError("its pixels do not decode")
+        raise InputError("its pixels do not decode")
     return {"image": cv2.cvtColor(_bounded(image), cv2.COLOR_BGR2RGB)}
 
 
@@ -182,14 +183,14 @@ def prepare_environment(path: Path) -> dict[str, NDArray[np.generic]]:
     radiance = np.nan_to_num(np.maximum(_bounded(radiance), 0), posinf=0.0)
     luminance = float(radiance.mean())
     if luminance <= 0:
-        raise ValueError("it is black")
+        raise InputError("it is black")
     return {"radiance": (radiance * (MEAN_LUMINANCE / luminance)).astype(np.float32)}
 
 
 def _read_hdr(path: Path) -> NDArray[np.float32]:
     image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None or image.ndim != 3 or image.dtype != np.float32:
-        raise ValueError("it is no Radiance HDR picture")
+        raise InputError("it is no Radiance HDR picture")
     return np.ascontiguousarray(image[..., 2::-1])
 
 

@@ -20,6 +20,7 @@ from scipy.optimize import nnls
 from datagen.errors import DatasetError
 from datagen.recipe.disparity_range import surface_disparities
 from scenes import FAMILIES, FamilyConfig, sample_scene
+from stereoforge_kit.errors import InputError
 
 PREFLIGHT_KEY = 3
 """First number of the preflight scenes' random streams, beside those of the three splits."""
@@ -77,7 +78,7 @@ class DisparityHistogram:
         components yet.
         """
         if not self.components:
-            raise ValueError("the disparity histogram has no components yet; fit_disparities finds them")
+            raise InputError("the disparity histogram has no components yet; fit_disparities finds them")
         turn = (scene + 0.5) * _GOLDEN % 1.0
         bounds = np.cumsum([component.share for component in self.components])
         return self.components[min(int(np.searchsorted(bounds, turn * bounds[-1])), len(bounds) - 1)]

@@ -22,6 +22,7 @@ from datagen.recipe.disparity_range import REACHED_PERCENT, with_disparity_at
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
 from scenes.serialization import OMIT_DEFAULT, from_plain, to_plain
 from scenes.user_assets.pool import AssetPool
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_text
 
 MAX_RECIPE_BYTES = 1 << 20
@@ -203,7 +204,7 @@ def _check_shape(text: str) -> None:
     for event in yaml.parse(text, yaml.SafeLoader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if isinstance(event, yaml.AliasEvent) or depth > MAX_RECIPE_DEPTH:
-            raise ValueError("it refers to another place in it or is nested too deeply")
+            raise InputError("it refers to another place in it or is nested too deeply")
 
 
 def read_recipe(path: Path) -> Recipe:

@@ -18,6 +18,7 @@ from datagen.errors import DatasetError
 from datagen.executors import Failure
 from datagen.recipe.recipe import Recipe
 from scenes import scene_to_json
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import Tree
 from stereoforge_kit.processes import WorkerError, call_limited
 
@@ -91,7 +92,7 @@ def read_quarantined(tree: Tree, split: str, scene: int) -> QuarantinedScene:
     try:
         entry = QuarantinedScene(**json.loads(tree.read(name)))
         if (entry.split, entry.scene) != (split, scene):
-            raise ValueError("it is another scene's")
+            raise InputError("it is another scene's")
         return entry
     except (OSError, ValueError, TypeError, RecursionError) as error:
         raise DatasetError(f"{tree.name}/{name}: is not an entry of the quarantine ({error})") from error

@@ -31,6 +31,7 @@ from datagen.formats.pfm import decode_pfm
 from datagen.formats.png import decode_png
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
+from stereoforge_kit.errors import InputError
 
 INDEX_NAME = "index.json"
 """The file that lists the shards of a folder, their samples and their SHA-256."""
@@ -134,7 +135,7 @@ def read_index(location: str) -> ShardSetIndex | None:
             and all(isinstance(key, str) for key in keys)
             for name, keys in index.shards.items()
         ):
-            raise ValueError("a shard's name or its list of samples is not as it should be")
+            raise InputError("a shard's name or its list of samples is not as it should be")
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FormatError(f"{url}: is not an index of shards ({error})") from error
     return index

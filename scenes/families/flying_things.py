@@ -40,6 +40,7 @@ from scenes.spec import (
 )
 from scenes.textures.sky import Sky
 from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture
+from stereoforge_kit.errors import InputError
 
 _SHAPE_FILL = 1.8
 """Mean projected area of the shapes, in squares of their half extents; measured over 300 draws."""
@@ -109,7 +110,7 @@ class FlyingThingsConfig(FamilyConfig):
         Raises ValueError for a least disparity that is not above 0.
         """
         if least_px <= 0:
-            raise ValueError(f"flying_things need a least disparity above 0, got {least_px:g}")
+            raise InputError(f"flying_things need a least disparity above 0, got {least_px:g}")
         low, high = self.disparity_share
         least, greatest = least_px / self.width, greatest_px / self.width
         stretch = math.log(greatest / least) / math.log(high / low)
@@ -131,10 +132,10 @@ class FlyingThingsConfig(FamilyConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 <= self.complexity <= 1:
-            raise ValueError(f"flying_things: complexity must be from 0 to 1, got {self.complexity}")
+            raise InputError(f"flying_things: complexity must be from 0 to 1, got {self.complexity}")
         for name in ("focal_mm", "baseline_m", "disparity_share", "background_disparity_share"):
             if getattr(self, name)[0] <= 0:
-                raise ValueError(f"flying_things: {name} must be above 0, got {getattr(self, name)}")
+                raise InputError(f"flying_things: {name} must be above 0, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)

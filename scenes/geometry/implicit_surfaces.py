@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.geometry.building import Triangles, Vertices
+from stereoforge_kit.errors import InputError
 
 
 def capsule_distances(
@@ -64,7 +65,7 @@ def surface_net(field: NDArray[np.float64]) -> tuple[Vertices, Triangles]:
     """
     inside = field < 0
     if not inside.any():
-        raise ValueError("the field is nowhere negative: there is no surface")
+        raise InputError("the field is nowhere negative: there is no surface")
     cells = np.array(field.shape) - 1
     total = np.zeros((*cells, 3))
     crossings = np.zeros(cells, np.int32)

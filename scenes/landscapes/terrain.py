@@ -15,6 +15,7 @@ from scenes.motion.trajectories import KEY_SPACING_FRAMES, vector, wander
 from scenes.random_draws import Range, chance, log_uniform, uniform
 from scenes.shapes.nature.landforms import Landscape
 from scenes.spec import Color, FinalPass, Fog, StereoCamera
+from stereoforge_kit.errors import InputError
 
 NEAREST_SHARE = 0.105
 """Disparity of the nearest surface allowed, as a share of the image width: 101 px at 960."""
@@ -44,9 +45,9 @@ class LandscapeConfig(FamilyConfig):
         super().__post_init__()
         for name in ("focal_mm", "focus_disparity_share", "focus_height_share"):
             if getattr(self, name)[0] <= 0:
-                raise ValueError(f"{name} must be above 0, got {getattr(self, name)}")
+                raise InputError(f"{name} must be above 0, got {getattr(self, name)}")
         if self.focus_disparity_share[1] > NEAREST_SHARE / 2:
-            raise ValueError(f"focus_disparity_share must not exceed {NEAREST_SHARE / 2}")
+            raise InputError(f"focus_disparity_share must not exceed {NEAREST_SHARE / 2}")
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scenes.geometry.building import Part, Triangles, Vertices, joined, solid
 from scenes.geometry.mesh import Mesh
 from scenes.spec import Shape
+from stereoforge_kit.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ class PartedShape(AnchoredShape):
         if not self.only:
             return Surface(*joined(*parts.values()))
         if self.only not in parts:
-            raise ValueError(f"a {type(self).__name__} has no part {self.only!r}: {', '.join(parts)}")
+            raise InputError(f"a {type(self).__name__} has no part {self.only!r}: {', '.join(parts)}")
         return Surface(*parts[self.only])
 
 

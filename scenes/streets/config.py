@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from scenes.family import FamilyConfig
 from scenes.random_draws import Count, Range
+from stereoforge_kit.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -82,8 +83,8 @@ class DrivingConfig(FamilyConfig):
         positive = ("baseline_m", "camera_height_m", "lane_m", "pavement_m", "kerb_m", "headway_m", "view_m")
         for name in (*positive, "tree_spacing_m", "lamp_spacing_m", "lanes"):
             if getattr(self, name)[0] <= 0:
-                raise ValueError(f"driving: {name} must be above 0, got {getattr(self, name)}")
+                raise InputError(f"driving: {name} must be above 0, got {getattr(self, name)}")
         if not self.focal_lengths_mm or min(self.focal_lengths_mm) <= 0:
-            raise ValueError(f"driving: focal_lengths_mm must be above 0, got {self.focal_lengths_mm}")
+            raise InputError(f"driving: focal_lengths_mm must be above 0, got {self.focal_lengths_mm}")
         if self.largest_disparity_share <= 0:
-            raise ValueError("driving: largest_disparity_share must be above 0")
+            raise InputError("driving: largest_disparity_share must be above 0")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from scenes.geometry.mesh import Mesh
 from scenes.spec import Shape, Texture
+from stereoforge_kit.errors import InputError
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _stores: list[Path] = []
@@ -30,7 +31,7 @@ def use_store(folder: Path) -> None:
 
 def _check_sha256(text: str) -> None:
     if not _SHA256.fullmatch(text):
-        raise ValueError(f"a user's file is named by its SHA-256, not {text[:80]!r}")
+        raise InputError(f"a user's file is named by its SHA-256, not {text[:80]!r}")
 
 
 def _load(sha256: str) -> dict[str, NDArray[np.generic]]:
@@ -41,7 +42,7 @@ def _load(sha256: str) -> dict[str, NDArray[np.generic]]:
         if path.is_file():
             with np.load(path, allow_pickle=False) as arrays:
                 return dict(arrays)
-    raise ValueError(f"the user's file {sha256[:12]}... is in no store; give the folders it came from again")
+    raise InputError(f"the user's file {sha256[:12]}... is in no store; give the folders it came from again")
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class UserMesh(Shape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:  # noqa: ARG003
-        raise ValueError("the user's meshes are drawn from an AssetPool")
+        raise InputError("the user's meshes are drawn from an AssetPool")
 
     def mesh(self) -> Mesh:
         arrays = _load(self.sha256)
@@ -112,7 +113,7 @@ class UserTexture(Texture):
 
     @classmethod
     def sample(cls, rng: np.random.Generator, size: int) -> Self:  # noqa: ARG003
-        raise ValueError("the user's textures are drawn from an AssetPool")
+        raise InputError("the user's textures are drawn from an AssetPool")
 
     def image(self) -> NDArray[np.uint8]:
         return np.asarray(_load(self.sha256)["image"], np.uint8)
@@ -126,7 +127,7 @@ class UserEnvironment(Texture):
 
     @classmethod
     def sample(cls, rng: np.random.Generator, size: int) -> Self:  # noqa: ARG003
-        raise ValueError("the user's environments are drawn from an AssetPool")
+        raise InputError("the user's environments are drawn from an AssetPool")
 
     def radiance(self) -> NDArray[np.float32]:
         """(H, W, 3) linear RGB of mean luminance 0.5, row 0 at the top."""
