@@ -20,7 +20,7 @@ from scenes.placement.boxes import OrientedBox
 from scenes.placement.ground import GroundPlacement, Spot
 from scenes.random_draws import chance, choose, integer, new_seed, uniform
 from scenes.shapes.anchored import PartedShape
-from scenes.shapes.nature.creatures import Eyeballs, Limb, SoftBody, iris_repeats
+from scenes.shapes.nature.soft_bodies import Eyeballs, Limb, SoftBody, iris_repeats
 from scenes.spec import Vector
 
 SKINNED = -1

@@ -13,7 +13,7 @@ from scenes.landscapes.characters import (
     sample_gait,
 )
 from scenes.random_draws import chance, choose, new_seed, uniform
-from scenes.shapes.nature.creatures import Eyeballs, SoftBody, Staff
+from scenes.shapes.nature.soft_bodies import Eyeballs, SoftBody, Staff
 
 _HEM = 0.045
 """Height of a robe's hem over the ground."""

@@ -34,7 +34,9 @@ class Ground(Protocol):
     """The ground of a scene, as far as placing things on it goes."""
 
     @property
-    def shape(self) -> Shape: ...
+    def shape(self) -> Shape:
+        """The shape that shows it."""
+        ...
 
     @property
     def half_m(self) -> float:

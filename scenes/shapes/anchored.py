@@ -162,9 +162,14 @@ class MetricShape(AnchoredShape):
         return self._built[1]
 
 
-@lru_cache(maxsize=256)
 def frame_of(shape: Shape) -> Frame:
     """The frame of any shape; one that is not anchored stands on the lowest point of its mesh."""
+    # A metric shape keeps its frame, and its mesh, only as long as it lives itself.
+    return shape.frame if isinstance(shape, MetricShape) else _frame_of(shape)
+
+
+@lru_cache(maxsize=256)
+def _frame_of(shape: Shape) -> Frame:
     if isinstance(shape, AnchoredShape):
         return shape.frame
     vertices = shape.mesh().vertices
