@@ -257,7 +257,7 @@ def measure_preset(task_name: str, name: str, crops: int, iterations: int) -> No
     wall, cpu = (time.perf_counter() - began) / iterations, (time.process_time() - cpu) / iterations
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(
-        f"{task_name:12}{name:6}{crops} x {preset.crop_width}x{preset.crop_height:<6}{1 / wall:8.2f} it/s  "
+        f"{task_name:14}{name:6}{crops} x {preset.crop_width}x{preset.crop_height:<6}{1 / wall:8.2f} it/s  "
         f"{cpu:8.3f} CPU s/it  {memory:5.2f} GiB",
         flush=True,
     )
