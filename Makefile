@@ -29,8 +29,8 @@ demo: .venv/.installed
 
 study: .venv/.installed
 	$(BIN)/stereoforge study --plan recipes/study.yaml --out $(STUDY)
-	rm -rf results && cp -R $(STUDY)/results results
-	@echo "the networks: $(STUDY)/runs; those in stereoforge/weights/ are of the flying_things there"
+	rm -rf results && cp -R $(STUDY)/results results && rm results/report.html
+	@echo "the report: $(STUDY)/results/report.html; the networks: $(STUDY)/runs (stereoforge/weights/ are flying_things')"
 
 test: .venv/.installed-dev
 	OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest $(PYTEST_FLAGS)
