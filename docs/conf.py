@@ -12,7 +12,7 @@ sys.path.insert(0, str(ROOT))  # the packages of this checkout, whatever is inst
 
 project = "StereoForge"
 author = "The StereoForge maintainers"
-copyright = "The StereoForge maintainers, Apache 2.0"
+project_copyright = "The StereoForge maintainers, Apache 2.0"
 release = version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 
 extensions = [
@@ -59,7 +59,9 @@ html_theme_options = {
 }
 
 
-def escape_absolute_values(_app: Any, _what: str, _name: str, _of: Any, _options: Any, lines: list[str]) -> None:
+def escape_absolute_values(
+    _app: Any, _what: str, _name: str, _of: Any, _options: Any, lines: list[str]
+) -> None:
     """Docstrings write |x| for an absolute value, which reStructuredText takes for a substitution."""
     for number, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):

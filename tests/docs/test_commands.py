@@ -44,7 +44,7 @@ def test_the_pages_print_commands() -> None:
 @pytest.mark.parametrize("words", COMMANDS)
 def test_the_command_line_takes_it(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     name, *arguments = (word.replace("$network", "regressor") for word in words)
-    monkeypatch.setattr(command_class(name), "run", lambda self: None)
+    monkeypatch.setattr(command_class(name), "run", lambda _: None)
     with pytest.raises(SystemExit) as ended:
         main([name, *arguments])
     assert ended.value.code == 0
