@@ -286,7 +286,7 @@ def vouched(arguments: argparse.Namespace, folder: Path) -> None:
 
 
 def clear_caches() -> None:
-    for remembered in (shard_index, webdataset._digests):
+    for remembered in (shard_index, webdataset._description):
         remembered.cache_clear()
 
 

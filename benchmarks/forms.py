@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from refine.evaluation.evaluate import evaluate
-from refine.methods.base import Method
+from refine.method import Method
 from refine.methods.ours_quadratic import OursQuadratic
 from refine.methods.regressor import Regressor
 from stereoforge.pipelines.prediction import open_predictors, open_settings, parameters_file

@@ -2,25 +2,28 @@
 
     python -m benchmarks.refine --data DATASET [--weights RUN] [--repeat 3] [--threads 2]
         [--skip-direct] [--skip-sgbm] [--large] [--crop 100]
+    python -m benchmarks.refine --toy 240x180 [--repeat 1]
 
 Takes the first frame of a rendered data set. With --weights its disparity, confidence and gradient are what the run's
 networks predict. The harder cases are made of other real parts: OpenCV's SGBM with holes filled as initial disparity,
 its left-right agreement as confidence (0 over large areas), the true gradients with noise; "sparse" keeps one confident
-pixel in a hundred.
+pixel in a hundred. --toy takes a small drawn frame instead and needs no data set.
 
 Every rival solves the same arrays, weights and set-up included, in turn within each repetition; the table gives
 medians of wall clock and CPU. The rivals know one thread only; --threads is ours. pyamg comes with the development
-requirements.
+requirements; without it the two solvers that need it are left out.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -70,6 +73,17 @@ def predicted_inputs(root: Path, split: str, weights: Path) -> Inputs:
     return disparity, confidence, gradient, sample.left
 
 
+def toy_inputs(height: int, width: int) -> Inputs:
+    """A slanted plane behind a box, with a disparity that is fattened around the box and noisy."""
+    from tests.refine.worlds import toy_frame
+
+    frame = toy_frame(0, height, width)
+    disparity, confidence, gradient = (
+        values.astype(np.float64) for values in (frame.disparity, frame.confidence, frame.gradient)
+    )
+    return disparity, confidence, gradient, frame.image
+
+
 def sparse(inputs: Inputs) -> Inputs:
     """The same with confidence 0 at 99 of 100 pixels."""
     disparity, confidence, gradient, image = inputs
@@ -95,30 +109,13 @@ def pyamg_cg(inputs: Inputs, form: Form) -> Floats:
     return solved.reshape(system.shape)
 
 
-def pyamg_m_matrix(inputs: Inputs, form: Form) -> Floats:
-    """CG on A, preconditioned by Ruge and Stueben's multigrid on the M-matrix: this project's former solver."""
-    import pyamg
-    from scipy.sparse.linalg import LinearOperator, cg
+def reference(inputs: Inputs, form: Form) -> Floats:
+    """CG on A, preconditioned by Ruge and Stueben's multigrid on an M-matrix: the readable reference in pyamg, this
+    project's former solver."""
+    from tests.refine.ruge_stueben import solve_ruge_stueben
 
-    system = build_system(*inputs, MRFParameters(), form)
-    hierarchy = pyamg.ruge_stuben_solver(
-        system.m_matrix(),
-        max_coarse=200,
-        CF=("RS", {"second_pass": True}),
-        strength=("classical", {"theta": 0.5}),
-        presmoother=("gauss_seidel", {"sweep": "forward"}),
-        postsmoother=("gauss_seidel", {"sweep": "backward"}),
-    )
-    size = inputs[0].size
-    solved, _ = cg(
-        LinearOperator((size, size), matvec=system.apply, dtype=np.float64),
-        system.right_hand_side,
-        x0=inputs[0].ravel(),
-        rtol=1e-7,
-        M=hierarchy.aspreconditioner(),
-        maxiter=1000,
-    )
-    return solved.reshape(system.shape)
+    solved, _ = solve_ruge_stueben(build_system(*inputs, MRFParameters(), form), inputs[0], tolerance=1e-7)
+    return solved
 
 
 def spsolve(inputs: Inputs, form: Form) -> Floats:
@@ -135,20 +132,22 @@ def timed(run: Callable[[], Floats]) -> tuple[Floats, float, float]:
     return result, time.perf_counter() - wall, time.process_time() - cpu
 
 
-def compare(name: str, inputs: Inputs, form: Form, rivals: list[Callable[..., Floats]], repeat: int) -> None:
+def compare(
+    name: str, inputs: Inputs, form: Form, rivals: list[Callable[[Inputs, Form], Floats]], repeat: int
+) -> None:
     """One table: all rivals in turn, `repeat` times."""
     from refine import solve_mrf
 
-    reference = solve_mrf(*inputs, form=form, solver="direct").disparity
+    exact = solve_mrf(*inputs, form=form, solver="direct").disparity
     ours(inputs, form)  # compiles
     runs: dict[str, list[tuple[float, float]]] = {rival.__name__: [] for rival in rivals}
     deviation = {}
     for _ in range(repeat):
         for rival in rivals:
-            found, wall, cpu = timed(lambda rival=rival: rival(inputs, form))  # type: ignore[misc]
+            found, wall, cpu = timed(partial(rival, inputs, form))
             runs[rival.__name__].append((wall, cpu))
-            deviation[rival.__name__] = np.abs(found - reference).max()
-    height, width = reference.shape
+            deviation[rival.__name__] = np.abs(found - exact).max()
+    height, width = exact.shape
     print(f"\n{name}, {form} form, {width}x{height}\n")
     print("| solver | seconds | CPU seconds | times ours | largest deviation, px |\n|---|---|---|---|---|")
     base = median(wall for wall, _ in runs["ours"])
@@ -201,13 +200,29 @@ def measure_size(path: str) -> None:
     )
 
 
-def main() -> None:
+def enlarged_sizes(inputs: Inputs, factors: tuple[int, ...], threads: int) -> None:
+    """The table of growth with size, each size in a fresh process."""
+    print(
+        "\n| size | seconds | microseconds a pixel | iterations | peak, float32 images |\n|---|---|---|---|---|",
+        flush=True,
+    )
+    for factor in factors:
+        with tempfile.TemporaryDirectory() as folder:
+            path = f"{folder}/inputs.npz"
+            keys = ("disparity", "confidence", "gradient", "image")
+            np.savez(path, **dict(zip(keys, enlarged(inputs, factor), strict=True)))
+            command = [sys.executable, "-m", "benchmarks.refine", "--threads", str(threads), "--child", path]
+            subprocess.run(command, check=True)
+
+
+def parsed_options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", type=Path)
     parser.add_argument("--split", default="train")
     parser.add_argument("--weights", type=Path, help="a run with regressor, ConfNet and GradNet")
+    parser.add_argument("--toy", help="WIDTHxHEIGHT of a drawn frame, in place of a data set")
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--skip-direct", action="store_true", help="leave spsolve on the paper's form out")
@@ -216,47 +231,48 @@ def main() -> None:
     parser.add_argument("--child", help=argparse.SUPPRESS)
     parser.add_argument("--crop", type=int, default=0, help="only this many pixels from the centre each way")
     options = parser.parse_args()
-    numba.set_num_threads(options.threads)
-    if options.child:
-        measure_size(options.child)
-        return
+    if not (options.data or options.toy or options.child):
+        parser.error("--data DATASET or --toy WIDTHxHEIGHT is needed")
+    return options
+
+
+def chosen_cases(options: argparse.Namespace) -> dict[str, Inputs]:
+    """The inputs that the options ask for, by name."""
     cases: dict[str, Inputs] = {}
-    if options.weights:
+    if options.toy:
+        width, height = (int(number) for number in options.toy.split("x"))
+        cases["toy"] = toy_inputs(height, width)
+    elif options.weights:
         cases["networks"] = predicted_inputs(options.data, options.split, options.weights)
-    if not options.skip_sgbm:
+    if options.data and not options.skip_sgbm:
         cases["SGBM"] = frame_inputs(options.data, options.split)
         cases["sparse"] = sparse(cases["SGBM"])
     if not cases:
         raise SystemExit("--skip-sgbm leaves nothing to solve without --weights")
     if options.crop:
         cases = {name: center(inputs, options.crop) for name, inputs in cases.items()}
+    return cases
+
+
+def main() -> None:
+    options = parsed_options()
+    numba.set_num_threads(options.threads)
+    if options.child:
+        measure_size(options.child)
+        return
+    cases = chosen_cases(options)
+    rivals = [ours, reference, pyamg_cg]
+    if importlib.util.find_spec("pyamg") is None:
+        print("pyamg is not installed, so the two solvers that need it are left out (pip install pyamg)")
+        rivals = [ours]
     for name, inputs in cases.items():
         empty = 1 - (inputs[1] > MRFParameters().confidence_floor).mean()
         print(f"{name}: confidence is at its floor at {empty:.0%} of the pixels; {options.threads} threads")
-        compare(name, inputs, "exact", [ours, pyamg_m_matrix, pyamg_cg], options.repeat)
+        compare(name, inputs, "exact", rivals, options.repeat)
     first, inputs = next(iter(cases.items()))
     if not options.skip_direct:
         compare(first, inputs, "paper", [ours, spsolve], options.repeat)
-    print(
-        "\n| size | seconds | microseconds a pixel | iterations | peak, float32 images |\n|---|---|---|---|---|"
-    )
-    for factor in (1, 2, 4) if options.large else (1,):
-        with tempfile.TemporaryDirectory() as folder:
-            path = f"{folder}/inputs.npz"
-            keys = ("disparity", "confidence", "gradient", "image")
-            np.savez(path, **dict(zip(keys, enlarged(inputs, factor), strict=True)))
-            subprocess.run(
-                [
-                    sys.executable,
-                    "-m",
-                    "benchmarks.refine",
-                    "--threads",
-                    str(options.threads),
-                    "--child",
-                    path,
-                ],
-                check=True,
-            )
+    enlarged_sizes(inputs, (1, 2, 4) if options.large else (1,), options.threads)
 
 
 if __name__ == "__main__":

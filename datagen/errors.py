@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from stereoforge_kit.errors import InputError
 
-class DatasetError(ValueError):
+
+class DatasetError(InputError):
     """A data set, or a part of it, is missing, incomplete or contradicts itself."""
 
 

@@ -1,7 +1,7 @@
-"""Confidence and slopes without networks, from what consistency, texture and the disparity itself tell.
+"""Confidence and gradients without networks, from left-right consistency, texture and the disparity itself.
 
-What `stereoforge refine` falls back on for a foreign disparity where a run has no networks for it (ours). Simple on
-purpose: the networks of a run folder do better.
+`stereoforge refine` uses them for a disparity of another predictor where a run folder has no regressor-free networks
+(ours). They are simple on purpose: the networks do better.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ def consistency_confidence(disparity: Map, consistency: Map, image: NDArray[np.u
     return np.where(np.isnan(disparity), 0, agreement * texture).astype(np.float32)
 
 
-def local_slopes(disparity: Map, confidence: Map, image: NDArray[np.uint8]) -> Map:
-    """(H, W, 2) [dx, dy]: of each direction the weighted median of the slopes around, over pixels of like colour.
+def local_gradients(disparity: Map, confidence: Map, image: NDArray[np.uint8]) -> Map:
+    """Gradients (H, W, 2) [dx, dy]: in each direction the weighted median of nearby slopes, in pixels per pixel.
 
-    Slopes between pixels that are not known, less than half sure, or as steep as an edge do not count; where none
-    counts the surface is taken to face the camera. Arguments as for `consistency_confidence`.
+    Pixels of similar colour weigh most. Slopes between pixels that are unknown, have a confidence below 1/2, or are as
+    steep as an edge do not count; where none counts the gradient is 0. Arguments as for `consistency_confidence`.
     """
     sure = np.where(confidence < 0.5, np.nan, disparity).astype(np.float32)
     slopes = []

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import trapezoid
 
+from stereoforge_kit.errors import InputError
+
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -117,7 +119,7 @@ class GradientPool:
         estimate = np.asarray(gradient, dtype=np.float64)
         truth = np.asarray(truth_gradient, dtype=np.float64)
         if estimate.shape != truth.shape or estimate.ndim != 3 or estimate.shape[2] != 2:
-            raise ValueError(f"gradients must be (H, W, 2) and alike, got {estimate.shape} and {truth.shape}")
+            raise InputError(f"gradients must be (H, W, 2) and alike, got {estimate.shape} and {truth.shape}")
         error = np.abs(estimate - truth)
         counted = np.isfinite(error) & _where(mask, error.shape[:2])[..., None]
         self.counts = self.counts + counted.sum(axis=(0, 1))
@@ -171,7 +173,7 @@ def sparsification_curve(
     scores = np.nan_to_num(np.asarray(confidence, dtype=np.float64), nan=-np.inf)
     where = _counted(disparity, truth, mask)
     if scores.shape != where.shape:
-        raise ValueError(f"confidence has shape {scores.shape}, the disparity {where.shape}")
+        raise InputError(f"confidence has shape {scores.shape}, the disparity {where.shape}")
     error = _errors(disparity, truth, mask)
     bad = ~(error <= threshold)
     removed = np.linspace(0, 1, steps + 1)
@@ -199,7 +201,7 @@ def optimal_auc(bad_rate: float) -> float:
     Hu and Mordohai, "A quantitative evaluation of confidence measures for stereo vision", PAMI 2012.
     """
     if not 0 <= bad_rate <= 1:
-        raise ValueError(f"a bad rate is between 0 and 1, got {bad_rate}")
+        raise InputError(f"a bad rate is between 0 and 1, got {bad_rate}")
     return 1.0 if bad_rate == 1 else float(bad_rate + (1 - bad_rate) * np.log1p(-bad_rate))
 
 
@@ -238,7 +240,7 @@ class D1Pool:
         outlier = ~((error <= 3) | (error <= 0.05 * np.abs(values)))
         foreground = np.zeros(values.shape, bool) if object_map is None else np.asarray(object_map) != 0
         if foreground.shape != values.shape:
-            raise ValueError(f"the object map has shape {foreground.shape}, the disparity {values.shape}")
+            raise InputError(f"the object map has shape {foreground.shape}, the disparity {values.shape}")
         classes = (where & ~foreground, where & foreground)
         self.pixels = self.pixels + [mask.sum() for mask in classes]
         self.outliers = self.outliers + [outlier[mask].sum() for mask in classes]
@@ -268,7 +270,7 @@ def _errors(disparity: ArrayLike, truth: ArrayLike, mask: ArrayLike | None) -> F
 def _counted(disparity: ArrayLike, truth: ArrayLike, mask: ArrayLike | None) -> Mask:
     values, estimate = np.asarray(truth, dtype=np.float64), np.asarray(disparity)
     if estimate.shape != values.shape or values.ndim != 2:
-        raise ValueError(
+        raise InputError(
             f"disparity and ground truth must be (H, W) and alike, got {estimate.shape}, {values.shape}"
         )
     return np.isfinite(values) & _where(mask, values.shape)
@@ -279,5 +281,5 @@ def _where(mask: ArrayLike | None, shape: tuple[int, ...]) -> Mask:
         return np.ones(shape, bool)
     where = np.asarray(mask)
     if where.shape != shape or where.dtype != np.bool_:
-        raise ValueError(f"a mask must be bool of shape {shape}, got {where.dtype} {where.shape}")
+        raise InputError(f"a mask must be bool of shape {shape}, got {where.dtype} {where.shape}")
     return where

@@ -17,6 +17,11 @@ EMPTIEST = 0.1
 """What is left of a family's crowd at complexity 0."""
 
 
+def crowd_share(complexity: float) -> float:
+    """The share of a family's crowd that is left at a complexity from 0 (`EMPTIEST`) to 1 (all of it)."""
+    return EMPTIEST + (1 - EMPTIEST) * complexity
+
+
 @dataclass(frozen=True)
 class FamilyConfig:
     """What every family lets the user choose; each family's own config adds its ranges."""
@@ -77,7 +82,7 @@ class FamilyConfig:
             raise ValueError(f"complexity must be from 0 to 1, got {complexity}")
         if complexity < 1 and not self.crowd and not self.sparsity:
             raise ValueError(f"{type(self).__name__} names no crowd that a curriculum could make smaller")
-        factor = EMPTIEST + (1 - EMPTIEST) * complexity
+        factor = crowd_share(complexity)
         changes: dict[str, Any] = {name: _scaled(getattr(self, name), factor) for name in self.crowd}
         changes |= {name: _scaled(getattr(self, name), 1 / factor) for name in self.sparsity}
         return replace(self, **changes)

@@ -1,4 +1,4 @@
-"""The trained networks that come with StereoForge."""
+"""The trained weights that are bundled with StereoForge."""
 
 from __future__ import annotations
 

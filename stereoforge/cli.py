@@ -13,7 +13,7 @@ from importlib.metadata import version
 from typing import Any
 
 from stereoforge.commands import COMMANDS, after_interruption, command_class, command_summary
-from stereoforge.errors import CommandError, UsageError
+from stereoforge_kit.errors import UserError
 
 DEBUG_FLAG = "--debug"
 DESCRIPTION = (
@@ -122,19 +122,13 @@ def _plain(complaint: str) -> str:
 
 def _explain(error: Exception) -> tuple[str, int]:
     """One sentence and an exit code for anything a command raised."""
-    if isinstance(error, UsageError):
-        return str(error), 2
+    if isinstance(error, UserError):
+        return str(error), error.exit_code
     if isinstance(error, ModuleNotFoundError) and error.name in MISSING_PARTS:
         return MISSING_PARTS[error.name], 1
     if isinstance(error, OSError):
         return f"{error.strerror or error}: {error.filename}" if error.filename else str(error), 1
-    if isinstance(error, CommandError | ValueError) or _is_our_own(error):
-        return str(error), 1
     return f"unexpected {type(error).__name__}: {error} (run again with {DEBUG_FLAG} to see where)", 1
-
-
-def _is_our_own(error: Exception) -> bool:
-    return type(error).__module__.split(".")[0] in {"scenes", "datagen", "training", "refine", "stereoforge"}
 
 
 def _say(sentence: str, code: int) -> int:

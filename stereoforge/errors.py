@@ -1,11 +1,17 @@
-"""What a command answers when it cannot do what was asked: one sentence and an exit code."""
+"""Errors of commands: one sentence and an exit code."""
 
 from __future__ import annotations
 
+from typing import ClassVar
 
-class UsageError(Exception):
-    """The command was given values it cannot take: exit code 2."""
+from stereoforge_kit.errors import UserError
 
 
-class CommandError(Exception):
-    """The command was right and did not succeed: exit code 1."""
+class UsageError(UserError):
+    """The command was given values it cannot take."""
+
+    exit_code: ClassVar[int] = 2
+
+
+class CommandError(UserError):
+    """The command was right and did not succeed."""

@@ -1,4 +1,4 @@
-"""Where every command says what it does, and how far its long jobs are."""
+"""The console that every command writes to."""
 
 from __future__ import annotations
 

@@ -1,5 +1,9 @@
 """What a user can get wrong when training or predicting."""
 
+from __future__ import annotations
 
-class TrainingError(Exception):
-    """One sentence naming what is wrong and where; the command line prints it without a traceback."""
+from stereoforge_kit.errors import UserError
+
+
+class TrainingError(UserError):
+    """One sentence that says what is wrong and where."""

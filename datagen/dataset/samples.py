@@ -66,6 +66,11 @@ class StereoSample:
         split, group, scene, _, _ = left.parts[-5:]
         return "/".join((split, group, scene, left.stem))
 
+    @property
+    def scene_name(self) -> str:
+        """Split and scene, for example `TEST/A/0003`."""
+        return self.name.rpartition("/")[0]
+
     @cached_property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels, from the header of the left image."""
@@ -130,6 +135,11 @@ class StereoSample:
     def object_index_right(self) -> NDArray[np.uint16]:
         """(H, W) 0 sky, else 1 + index in the scene's objects."""
         return self._object_index("right")
+
+    @property
+    def foreground_left(self) -> NDArray[np.uint16] | None:
+        """None: the object index numbers everything, and none of it is called the foreground."""
+        return None
 
     def view(self, eye: Eye) -> EyeView:
         """Everything of the "left" or "right" eye."""

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.export.lidar import lidar_mask
 from datagen.formats import write_png
+from datagen.sources.kitti import FRAME_LIST
 from scenes.shapes.street.vehicles import VEHICLE_PARTS
 from scenes.spec import Scene
 from scenes.streets.traffic import vehicle_of
@@ -45,7 +46,7 @@ def export_kitti(
             names.append(f"{number:06d}_10 {sample.name}\n")
             done += 1
             progress(done, total)
-        out.write(f"{folder}/frames.txt", "".join(names).encode())
+        out.write(f"{folder}/{FRAME_LIST}", "".join(names).encode())
 
 
 def encode_disparity(disparity: NDArray[np.float32], keep: NDArray[np.bool_]) -> NDArray[np.uint16]:

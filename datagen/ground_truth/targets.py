@@ -107,8 +107,22 @@ def material_index(scene: Scene, object_index: NDArray[np.integer[Any]]) -> NDAr
     return np.array(worn, np.uint16)[object_index]
 
 
+def object_edges(object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
+    """(H, W) where a pixel shows another object than one of its four neighbours."""
+    marked = np.zeros(object_index.shape, bool)
+    down, across = object_index[1:] != object_index[:-1], object_index[:, 1:] != object_index[:, :-1]
+    marked[1:] |= down
+    marked[:-1] |= down
+    marked[:, 1:] |= across
+    marked[:, :-1] |= across
+    return marked
+
+
 def motion_boundaries(flow: NDArray[np.float32], object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
-    """(H, W) where two objects meet that move differently, by the (H, W, 2) flow of one direction."""
+    """(H, W) where two objects meet that move differently, by the (H, W, 2) flow of one direction.
+
+    The flow matters at the objects' edges only (`object_edges`).
+    """
     marked = np.zeros(object_index.shape, bool)
     for axis in (0, 1):
         first = tuple(slice(0, -1) if k == axis else slice(None) for k in (0, 1))
@@ -145,6 +159,8 @@ class ExtraTargets:
         for direction in DIRECTIONS:
             if "disparity_change" in self._kinds:
                 made["disparity_change", direction] = surfaces.disparity_change(direction)
+            if not {"optical_flow", "motion_boundaries"} & set(self._kinds):
+                continue
             flow = surfaces.flow(direction)
             if "optical_flow" in self._kinds:
                 made["optical_flow", direction] = flow

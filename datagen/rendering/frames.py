@@ -20,6 +20,7 @@ from datagen.ground_truth.targets import ExtraTargets
 from datagen.rendering.exposure import automatic_exposure, develop
 from datagen.rendering.sensor import Sensor
 from scenes import Scene
+from stereoforge_kit.errors import UserError
 from stereoforge_kit.processes import captured_output
 
 BLENDER_LOG = "blender.log"
@@ -77,7 +78,7 @@ class Stopwatch:
             self.seconds[name] = round(self.seconds.get(name, 0.0) + time.perf_counter() - start, 4)
 
 
-class BlenderError(RuntimeError):
+class BlenderError(UserError):
     """Blender could not render a scene; the message carries the end of its log."""
 
 

@@ -2,6 +2,7 @@
 `*_left.disp.png`, `*_right.disp.png`.
 
 Disparities of both views as 16-bit PNG, d = value / 32, every pixel valid. Occlusion is derived from both.
+Every frame is a scene of its own; the four folders are kinds of scenes.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ def _frames(root: Path) -> Iterator[FileFrame]:
         name = (truth.parent / stem).relative_to(root).as_posix()
         yield FileFrame(
             name=name,
+            scene_name=name,
             read_left=partial(read_picture, truth.with_name(f"{stem}_left.jpg")),
             read_right=partial(read_picture, truth.with_name(f"{stem}_right.jpg")),
             read_disparity_left=partial(read_disparity, truth),

@@ -1,17 +1,21 @@
 """ETH3D two-view stereo (Schöps et al., CVPR 2017): `two_view_training/<scene>/im0.png, im1.png` and
 `two_view_training_gt/<scene>/disp0GT.pfm, mask0nocc.png`, the truth also found beside the images.
 
-Encoded as Middlebury's: infinite where there is none, the mask 255 where both views show the point.
+Encoded as Middlebury's: infinite where there is none, the mask 255 where both views show the point. Pairs of one place
+(`delivery_area_1l`, `delivery_area_3s`) are of one scene.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from datagen.sources.middlebury import ETH3D_IMAGES, scene_frame
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+
+_PAIR = re.compile(r"_\d+[ls]$")
 
 
 def _recognises(root: Path) -> bool:
@@ -27,7 +31,8 @@ def _frames(root: Path) -> Iterator[FileFrame]:
     for image in sorted((root / ETH3D_IMAGES).glob("*/im0.png")):
         scene = image.parent
         beside = truths / scene.name
-        frame = scene_frame(scene.name, scene, beside if beside.is_dir() else scene)
+        place = _PAIR.sub("", scene.name)
+        frame = scene_frame(scene.name, place, scene, beside if beside.is_dir() else scene)
         if frame is not None:
             yield frame
 

@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats import read_png
+from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.picture import read_picture
 from datagen.ground_truth.from_disparity import occlusion_from_mask
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 UNITS_PER_PX = 256
+FRAME_LIST = "frames.txt"
+"""In sets that were exported to this layout: a line a frame, its name here and there (`datagen.export.kitti`)."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ def read_labels(all_points: Path, visible_points: Path) -> NDArray[np.uint8]:
     return occlusion_from_mask(disparity, hidden)
 
 
-def read_objects(path: Path) -> NDArray[np.uint16]:
+def read_foreground(path: Path) -> NDArray[np.uint16]:
     """0 background, else a number a car. Raises FormatError."""
     return read_png(path).astype(np.uint16)
 
@@ -83,17 +86,29 @@ def _find(root: str, split: str, editions: tuple[_Edition, ...]) -> Sequence[Ste
     return [] if edition is None else FileFrames(_frames(_training(Path(root)), edition))
 
 
+def _scenes(frame_list: Path) -> dict[str, str]:
+    """The scenes of exported frames by the frames' names; empty for KITTI itself, where every frame is one of its own.
+    Raises FormatError."""
+    if not frame_list.is_file():
+        return {}
+    lines = read_bounded(frame_list, MAX_JSON_BYTES).decode("utf-8", errors="replace").splitlines()
+    pairs = (words for line in lines if len(words := line.split()) == 2)
+    return {name: original.rpartition("/")[0] or original for name, original in pairs}
+
+
 def _frames(folder: Path, edition: _Edition) -> Iterator[FileFrame]:
+    scenes = _scenes(folder / FRAME_LIST)
     for truth in sorted((folder / edition.all_points).glob("*_10.png")):
         visible = folder / edition.visible_points / truth.name
         objects = None if edition.objects is None else folder / edition.objects / truth.name
         yield FileFrame(
             name=truth.stem,
+            scene_name=scenes.get(truth.stem, truth.stem),
             read_left=partial(read_picture, folder / edition.left / truth.name),
             read_right=partial(read_picture, folder / edition.right / truth.name),
             read_disparity_left=partial(read_disparity, truth),
             read_occlusion_left=partial(read_labels, truth, visible) if visible.is_file() else None,
-            read_object_index_left=partial(read_objects, objects) if objects and objects.is_file() else None,
+            read_foreground_left=partial(read_foreground, objects) if objects and objects.is_file() else None,
         )
 
 

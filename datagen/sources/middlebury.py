@@ -3,11 +3,13 @@ GCPR 2014). A folder a scene: `im0.png`, `im1.png`, `disp0.pfm` (benchmark: `dis
 `mask0nocc.png`.
 
 Disparities are pixels, infinity where there is none. The mask is 255 where both views show the point; without it
-occlusion is derived from both disparities, if there are both.
+occlusion is derived from both disparities, if there are both. Pictures in other light, from other directions or at
+other sizes (`Piano` and `PianoL`, `chess1` and `chess2`, `trainingQ` and `trainingF`) are of one scene.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -24,6 +26,8 @@ from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 ETH3D_IMAGES = "two_view_training"
 """ETH3D's folder of images: its scenes are encoded as these are (`datagen.sources.eth3d`)."""
 _SHOWN_BY_BOTH = 255
+_VARIANT = re.compile(r"(?<=[a-z])\d?[ELP]?(-(im)?perfect)?$")
+"""What tells pictures of one scene apart: the direction of view, the exposure, the light, the rectification."""
 _TRUTH = ("disp{}GT.pfm", "disp{}.pfm")
 
 
@@ -42,7 +46,7 @@ def read_labels(truth: Path, mask: Path) -> NDArray[np.uint8]:
     return occlusion_from_mask(disparity, hidden)
 
 
-def scene_frame(name: str, images: Path, truths: Path) -> FileFrame | None:
+def scene_frame(name: str, scene_name: str, images: Path, truths: Path) -> FileFrame | None:
     """The frame of a scene's folders, or None without truth."""
     left = _truth(truths, 0)
     if left is None:
@@ -50,6 +54,7 @@ def scene_frame(name: str, images: Path, truths: Path) -> FileFrame | None:
     right, mask = _truth(truths, 1), truths / "mask0nocc.png"
     return FileFrame(
         name=name,
+        scene_name=scene_name,
         read_left=partial(read_picture, images / "im0.png"),
         read_right=partial(read_picture, images / "im1.png"),
         read_disparity_left=partial(read_disparity, left),
@@ -74,7 +79,10 @@ def _frames(root: Path) -> Iterator[FileFrame]:
     for pattern in ("im0.png", "*/im0.png", "*/*/im0.png"):
         for image in sorted(root.glob(pattern)):
             name = image.parent.relative_to(root).as_posix()
-            frame = scene_frame(image.parent.name if name == "." else name, image.parent, image.parent)
+            scene_name = _VARIANT.sub("", image.parent.name)
+            frame = scene_frame(
+                image.parent.name if name == "." else name, scene_name, image.parent, image.parent
+            )
             if frame is not None:
                 yield frame
 

@@ -52,6 +52,7 @@ def _frames(root: Path) -> Iterator[FileFrame]:
         if left and right and truth_left:
             yield FileFrame(
                 name=scene.name,
+                scene_name=scene.name,
                 read_left=partial(read_picture, left),
                 read_right=partial(read_picture, right),
                 read_disparity_left=partial(read_disparity, truth_left),

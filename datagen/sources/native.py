@@ -6,15 +6,19 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from datagen.dataset.layout import SPLITS
+from datagen.dataset.layout import RENDER_PASSES, SPLITS
 from datagen.dataset.samples import StereoDataset, StereoSample, open_layout
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import StereoFrame
 from datagen.sources.webdataset import INDEX_NAME
 
 
-def _recognises(root: Path) -> bool:
-    return (root / "recipe.yaml").is_file() and not (root / INDEX_NAME).is_file()  # Shards have a recipe too.
+def _recognises(root: Path, render_pass: str) -> bool:
+    """Whether it is a data set of ours; one with the images of the final pass alone is recognised by that pass."""
+    if not (root / "recipe.yaml").is_file() or (root / INDEX_NAME).is_file():  # Shards have a recipe too.
+        return False
+    clean, final = ((root / RENDER_PASSES[name]).is_dir() for name in ("clean", "final"))
+    return (final and not clean) == (render_pass == "final")
 
 
 def _find_frames(location: str, split: str, render_pass: str) -> Sequence[StereoFrame]:
@@ -24,15 +28,16 @@ def _find_frames(location: str, split: str, render_pass: str) -> Sequence[Stereo
     return frames
 
 
-FORMATS = (
+FORMATS = tuple(
     SourceFormat(
-        "native", "a data set of ours", _recognises, partial(_find_frames, render_pass="clean"), SPLITS
-    ),
-    SourceFormat(
-        "native-final",
-        "a data set of ours (final pass)",
-        lambda _: False,
-        partial(_find_frames, render_pass="final"),
+        name,
+        title,
+        partial(_recognises, render_pass=render_pass),
+        partial(_find_frames, render_pass=render_pass),
         SPLITS,
-    ),
+    )
+    for name, title, render_pass in (
+        ("native", "a data set of ours", "clean"),
+        ("native-final", "a data set of ours (final pass)", "final"),
+    )
 )

@@ -107,4 +107,6 @@ def source_formats() -> dict[str, SourceFormat]:
     import datagen.sources
     from scenes.discovery import modules_in
 
-    return {kind.name: kind for module in modules_in(datagen.sources) for kind in getattr(module, "FORMATS", ())}
+    return {
+        kind.name: kind for module in modules_in(datagen.sources) for kind in getattr(module, "FORMATS", ())
+    }

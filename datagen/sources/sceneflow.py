@@ -5,11 +5,15 @@ Disparities are PFM in pixels for both views. Most files are positive, some (rig
 DispNet and FlowNet 2.0) negative throughout, so a file whose median is negative is turned. What still is negative
 then, or larger than the image is wide, is an error of the set (FlyingThings3D has such frames) and becomes NaN.
 Occlusion is derived from both disparities.
+
+A scene of FlyingThings3D is a folder of frames. Driving is one street, seen with two lenses, in two directions and at
+two speeds. Monkaa's folders show eight worlds, most of them more than once: `eating_x2` and `eating_camera2_x2`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -24,6 +28,8 @@ from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
 PARTS = {"train": "TRAIN", "test": "TEST"}
 """FlyingThings3D's own splits."""
+_VARIANT = re.compile(r"(_(camera2|naked|augmented\d|difftex\d?|winter))*_x2$")
+"""What tells Monkaa's folders of one world apart."""
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
@@ -36,31 +42,40 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
     return disparity
 
 
-def _flying_things(root: Path) -> bool:
+def _flying_things(root: Path, images: str) -> bool:
     return not (root / "recipe.yaml").is_file() and any(
-        (root / folder / part).is_dir() for folder in PASSES.values() for part in PARTS.values()
+        (root / images / part).is_dir() for part in PARTS.values()
     )
 
 
-def _driving(root: Path) -> bool:
-    return any(True for folder in PASSES.values() for _ in root.glob(f"{folder}/*mm_focallength/*/*/left"))
+def _driving(root: Path, images: str) -> bool:
+    return any(True for _ in root.glob(f"{images}/*mm_focallength/*/*/left"))
 
 
-def _monkaa(root: Path) -> bool:
-    return any(True for folder in PASSES.values() for _ in root.glob(f"{folder}/*/left"))
+def _monkaa(root: Path, images: str) -> bool:
+    return any(True for _ in root.glob(f"{images}/*/left"))
 
 
-def _find(root: str, split: str, render_pass: str, pattern: str) -> Sequence[StereoFrame]:
+def _recognises(root: Path, render_pass: str, has_images: Callable[[Path, str], bool]) -> bool:
+    """Whether the folder has a pass's images; those of the final pass count where there are no clean ones."""
+    passes = [name for name, images in PASSES.items() if has_images(root, images)]
+    return passes[:1] == [render_pass]
+
+
+def _find(
+    root: str, split: str, render_pass: str, pattern: str, scene_of: Callable[[str], str]
+) -> Sequence[StereoFrame]:
     images = Path(root) / PASSES[render_pass]
     truths = Path(root) / "disparity"
-    return FileFrames(_frames(images, truths, pattern.format(part=PARTS.get(split, ""))))
+    return FileFrames(_frames(images, truths, pattern.format(part=PARTS.get(split, "")), scene_of))
 
 
-def _frames(images: Path, truths: Path, pattern: str) -> Iterator[FileFrame]:
+def _frames(images: Path, truths: Path, pattern: str, scene_of: Callable[[str], str]) -> Iterator[FileFrame]:
     for truth in sorted(truths.glob(f"{pattern}/left/*.pfm")):
         scene = truth.parent.parent.relative_to(truths)
         yield FileFrame(
             name=f"{scene.as_posix()}/{truth.stem}",
+            scene_name=scene_of(scene.as_posix()),
             read_left=partial(read_picture, images / scene / "left" / f"{truth.stem}.png"),
             read_right=partial(read_picture, images / scene / "right" / f"{truth.stem}.png"),
             read_disparity_left=partial(read_disparity, truth),
@@ -70,21 +85,20 @@ def _frames(images: Path, truths: Path, pattern: str) -> Iterator[FileFrame]:
 
 def _formats() -> Iterator[SourceFormat]:
     kinds = (
-        ("flyingthings3d", "FlyingThings3D", _flying_things, "{part}/*/*", tuple(PARTS)),
-        ("driving", "SceneFlow Driving", _driving, "*mm_focallength/*/*", ()),
-        ("monkaa", "SceneFlow Monkaa", _monkaa, "*", ()),
+        ("flyingthings3d", "FlyingThings3D", _flying_things, "{part}/*/*", str, tuple(PARTS)),
+        ("driving", "SceneFlow Driving", _driving, "*mm_focallength/*/*", lambda _: "driving", ()),
+        ("monkaa", "SceneFlow Monkaa", _monkaa, "*", lambda folder: _VARIANT.sub("", folder), ()),
     )
-    for name, title, recognises, pattern, splits in kinds:
-        yield SourceFormat(
-            name, title, recognises, partial(_find, render_pass="clean", pattern=pattern), splits
-        )
-        yield SourceFormat(
-            f"{name}-final",
-            f"{title} (final pass)",
-            lambda _: False,
-            partial(_find, render_pass="final", pattern=pattern),
-            splits,
-        )
+    for name, title, has_images, pattern, scene_of, splits in kinds:
+        for render_pass in PASSES:
+            final = render_pass == "final"
+            yield SourceFormat(
+                f"{name}-final" if final else name,
+                f"{title} (final pass)" if final else title,
+                partial(_recognises, render_pass=render_pass, has_images=has_images),
+                partial(_find, render_pass=render_pass, pattern=pattern, scene_of=scene_of),
+                splits,
+            )
 
 
 FORMATS = tuple(_formats())

@@ -21,6 +21,7 @@ from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
+PASSES = ("clean", "final")
 _UNITS = np.array([4, 1 / 64, 1 / 16384], np.float32)
 
 
@@ -47,11 +48,11 @@ def _training(root: Path) -> Path:
     return root / "training" if (root / "training").is_dir() else root
 
 
-def _recognises(root: Path) -> bool:
+def _recognises(root: Path, render_pass: str) -> bool:
+    """Whether the folder has a pass's images; those of the final pass count where there are no clean ones."""
     folder = _training(root)
-    return (folder / "disparities").is_dir() and any(
-        (folder / f"{p}_left").is_dir() for p in ("clean", "final")
-    )
+    passes = [name for name in PASSES if (folder / f"{name}_left").is_dir()]
+    return (folder / "disparities").is_dir() and passes[:1] == [render_pass]
 
 
 def _find(root: str, split: str, render_pass: str) -> Sequence[StereoFrame]:  # noqa: ARG001
@@ -63,6 +64,7 @@ def _frames(folder: Path, render_pass: str) -> Iterator[FileFrame]:
         path = truth.relative_to(folder / "disparities")
         yield FileFrame(
             name=path.with_suffix("").as_posix(),
+            scene_name=path.parent.as_posix(),
             read_left=partial(read_picture, folder / f"{render_pass}_left" / path),
             read_right=partial(read_picture, folder / f"{render_pass}_right" / path),
             read_disparity_left=partial(read_disparity, truth),
@@ -72,9 +74,12 @@ def _frames(folder: Path, render_pass: str) -> Iterator[FileFrame]:
         )
 
 
-FORMATS = (
-    SourceFormat("sintel", "MPI Sintel", _recognises, partial(_find, render_pass="clean")),
+FORMATS = tuple(
     SourceFormat(
-        "sintel-final", "MPI Sintel (final pass)", lambda _: False, partial(_find, render_pass="final")
-    ),
+        name, title, partial(_recognises, render_pass=render_pass), partial(_find, render_pass=render_pass)
+    )
+    for name, title, render_pass in (
+        ("sintel", "MPI Sintel", "clean"),
+        ("sintel-final", "MPI Sintel (final pass)", "final"),
+    )
 )

@@ -28,6 +28,11 @@ class StereoFrame(Protocol):
         """Unique within its source."""
 
     @property
+    def scene_name(self) -> str:
+        """Which of its source's scenes it is of: frames of one scene show the same things at other moments, from other
+        places, in other light, so they are no independent draws."""
+
+    @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
 
@@ -61,7 +66,12 @@ class StereoFrame(Protocol):
 
     @property
     def object_index_left(self) -> NDArray[np.uint16] | None:
-        """(H, W) 0 background, else a number an object; None where the set has none."""
+        """(H, W) 0 where nothing is hit (sky), else a number an object; None where the set has none."""
+
+    @property
+    def foreground_left(self) -> NDArray[np.uint16] | None:
+        """(H, W) 0 background, else a number a foreground object: KITTI's object map, whose foreground is its cars.
+        None where the set does not tell one from the other."""
 
 
 @dataclass(frozen=True)
@@ -73,12 +83,14 @@ class FileFrame:
     """
 
     name: str
+    scene_name: str
     read_left: Callable[[], Picture]
     read_right: Callable[[], Picture]
     read_disparity_left: Callable[[], DisparityMap]
     read_disparity_right: Callable[[], DisparityMap] | None = None
     read_occlusion_left: Callable[[], NDArray[np.uint8]] | None = None
     read_object_index_left: Callable[[], NDArray[np.uint16]] | None = None
+    read_foreground_left: Callable[[], NDArray[np.uint16]] | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -124,6 +136,12 @@ class FileFrame:
         if self.read_object_index_left is None:
             return None
         return self._checked("object index", self.read_object_index_left())
+
+    @cached_property
+    def foreground_left(self) -> NDArray[np.uint16] | None:
+        if self.read_foreground_left is None:
+            return None
+        return self._checked("foreground", self.read_foreground_left())
 
     @cached_property
     def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

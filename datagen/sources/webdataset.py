@@ -35,6 +35,7 @@ INDEX_NAME = "index.json"
 META = "meta.json"
 """The member that describes its sample, with the SHA-256 of the other ones."""
 _DESCRIPTIONS_KEPT = 256
+_KEY = re.compile(rf"((?:{'|'.join(SPLITS)})-\d{{4,}})-\d{{4,}}")
 _SHARD_NAME = re.compile(rf"({'|'.join(SPLITS)})-\d{{6,}}\.tar")
 
 
@@ -59,6 +60,13 @@ class ShardFrames(Sequence[StereoFrame]):
         if isinstance(index, slice):
             return ShardFrames(self.samples[index])
         return _frame(*self.samples[index])
+
+    @property
+    def family(self) -> str | None:
+        """The family of our worlds that they show, as the first sample describes itself; None where it does not say.
+        Raises FormatError."""
+        family = _description(*self.samples[0]).get("family") if self.samples else None
+        return family if isinstance(family, str) else None
 
     @cached_property
     def groups(self) -> list[int]:
@@ -124,10 +132,17 @@ def read_index(location: str) -> ShardSetIndex | None:
     return index
 
 
+def scene_of(key: str) -> str:
+    """The scene of a sample by its key: `<split>-<scene>` of ours, the folder of keys with one, else its own."""
+    match = _KEY.fullmatch(key)
+    return match[1] if match else key.rpartition("/")[0] or key
+
+
 def _frame(shard: str, key: str) -> FileFrame:
     read = partial(_read, shard, key)
     return FileFrame(
         name=key,
+        scene_name=scene_of(key),
         read_left=partial(read, "left.png", decode_png),
         read_right=partial(read, "right.png", decode_png),
         read_disparity_left=partial(read, "disparity_left.pfm", decode_pfm),
@@ -148,22 +163,33 @@ def _read(shard: str, key: str, member: str, decode: Any) -> Any:
         raise FormatError(f"{shard}: has no sample {key}") from error
     if data is None:
         raise FormatError(f"{shard}: its sample {key} has no {member}")
-    digest = _digests(shard, key).get(member)
+    digest = _digest(shard, key, member)
     if digest is not None and hashlib.sha256(data).hexdigest() != digest:
         raise FormatError(f"{shard}: {key}.{member} is damaged, its SHA-256 is not the one in {META}")
     return decode(data, f"{shard}: {key}.{member}")
 
 
+def _digest(shard: str, key: str, member: str) -> str | None:
+    """The SHA-256 of a sample's member, if the sample says it; shards that others made may not."""
+    digests = _description(shard, key).get("sha256", {})
+    if not isinstance(digests, dict):
+        raise FormatError(f"{shard}: {key}.{META} does not describe its sample (sha256 is no object)")
+    return digests.get(member)
+
+
 @lru_cache(maxsize=_DESCRIPTIONS_KEPT)
-def _digests(shard: str, key: str) -> dict[str, str]:
-    """The SHA-256 of a sample's members, as far as it says them; shards that others made may not."""
+def _description(shard: str, key: str) -> dict[str, Any]:
+    """What a sample says of itself; nothing, where it has no such member."""
     content = read_sample_member(shard, key, META)
     if content is None:
         return {}
     try:
-        return dict(json.loads(content).get("sha256", {}))
-    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        description = json.loads(content)
+        if not isinstance(description, dict):
+            raise TypeError("it is no object")
+    except (ValueError, TypeError, RecursionError) as error:
         raise FormatError(f"{shard}: {key}.{META} does not describe its sample ({error})") from error
+    return description
 
 
 FORMATS = (SourceFormat("webdataset", "WebDataset shards", _recognises, _find, SPLITS),)

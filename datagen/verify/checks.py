@@ -179,6 +179,16 @@ def check_derived(values: NDArray[Any], expected: NDArray[Any], origin: str) -> 
         yield f"{wrong} pixels are marked otherwise than {origin} say"
 
 
+def check_boundaries(marked: NDArray[np.bool_], expected: NDArray[np.bool_]) -> Iterator[str]:
+    """Motion boundaries (H, W) agree with those of the scene's geometry, of the pixels that either marks."""
+    either = marked | expected
+    yield from _too_many(
+        (marked != expected)[either],
+        MAX_OFF_LABELS,
+        "pixels of motion boundaries are marked otherwise than the scene's geometry says",
+    )
+
+
 def _in_other_view(
     eye: Eye, disparity: NDArray[np.float32], other_disparity: NDArray[np.float32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]:

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from datagen.dataset.layout import DIRECTIONS, EYES, FIRST_FRAME, RENDER_PASSES, Direction, Eye
 from datagen.dataset.samples import StereoSample
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.targets import PixelSurfaces, material_index, motion_boundaries
+from datagen.ground_truth.targets import PixelSurfaces, material_index, motion_boundaries, object_edges
 from datagen.recipe.recipe import Recipe
 from datagen.verify.checks import (
+    check_boundaries,
     check_derived,
     check_disparity,
     check_geometry,
@@ -100,38 +101,66 @@ class FrameCheck:
     def _check_extra_targets(self, eye: Eye) -> Iterator[tuple[Path, str]]:
         """The targets that the recipe asks for besides the basic ones."""
         sample, kinds = self.samples[0], self.recipe.targets
-        if not kinds or self.caster is None:
-            return
         rows, columns = self._sampled(eye)
-        instant = sample.frame - FIRST_FRAME
-        surfaces = PixelSurfaces(self.caster, eye, instant, rows, columns)
+        surfaces = None
+        if self.caster is not None and not set(kinds) <= {"material_index", "motion_boundaries"}:
+            surfaces = PixelSurfaces(self.caster, eye, sample.frame - FIRST_FRAME, rows, columns)
         if "material_index" in kinds:
-            worn = material_index(self.scene, sample.view(eye).object_index)
-            for message in check_derived(sample.material_index(eye), worn, "the objects' materials"):
-                yield self._file("material_index", eye), message
+            stored, index = sample.material_index(eye), sample.view(eye).object_index
+            if index.max() <= len(self.scene.objects):  # Else that is the problem, and has been told.
+                worn = material_index(self.scene, index)
+                for message in check_derived(stored, worn, "the objects' materials"):
+                    yield self._file("material_index", eye), message
         if "normals" in kinds:
-            for message in check_vectors(
-                sample.normals(eye)[rows, columns], surfaces.normals(), NORMAL_TOLERANCE
-            ):
-                yield self._file("normals", eye), message
+            normals = sample.normals(eye)[rows, columns]
+            if surfaces is not None:
+                for message in check_vectors(normals, surfaces.normals(), NORMAL_TOLERANCE):
+                    yield self._file("normals", eye), message
         for direction in DIRECTIONS:
             yield from self._check_motion(eye, direction, surfaces)
+        if "motion_boundaries" in kinds:
+            yield from self._check_boundaries(eye)
 
     def _check_motion(
-        self, eye: Eye, direction: Direction, surfaces: PixelSurfaces
+        self, eye: Eye, direction: Direction, surfaces: PixelSurfaces | None
     ) -> Iterator[tuple[Path, str]]:
         sample, kinds = self.samples[0], self.recipe.targets
         rows, columns = self._sampled(eye)
-        flow = sample.flow(eye, direction) if "optical_flow" in kinds else None
-        if flow is not None:
-            for message in check_vectors(flow[rows, columns], surfaces.flow(direction), MOTION_TOLERANCE_PX):
-                yield self._file("optical_flow", eye, direction), message
+        if "optical_flow" in kinds:
+            flow = sample.flow(eye, direction)[rows, columns]
+            if surfaces is not None:
+                for message in check_vectors(flow, surfaces.flow(direction), MOTION_TOLERANCE_PX):
+                    yield self._file("optical_flow", eye, direction), message
         if "disparity_change" in kinds:
             change = sample.disparity_change(eye, direction)[rows, columns]
-            for message in check_vectors(change, surfaces.disparity_change(direction), MOTION_TOLERANCE_PX):
-                yield self._file("disparity_change", eye, direction), message
-        if "motion_boundaries" in kinds and flow is not None:
+            if surfaces is not None:
+                for message in check_vectors(
+                    change, surfaces.disparity_change(direction), MOTION_TOLERANCE_PX
+                ):
+                    yield self._file("disparity_change", eye, direction), message
+
+    def _check_boundaries(self, eye: Eye) -> Iterator[tuple[Path, str]]:
+        """Motion boundaries follow from the stored flow; where none is stored, from that of the geometry."""
+        sample, stored = self.samples[0], "optical_flow" in self.recipe.targets
+        index = sample.view(eye).object_index
+        for direction in DIRECTIONS:
             marked = sample.motion_boundaries(eye, direction)
-            expected = motion_boundaries(flow, sample.view(eye).object_index)
-            for message in check_derived(marked, expected, "optical flow and object index"):
+            messages: Iterator[str] = iter(())
+            if stored:
+                expected = motion_boundaries(sample.flow(eye, direction), index)
+                messages = check_derived(marked, expected, "optical flow and object index")
+            elif self.caster is not None:
+                flow = self._flow_at(self.caster, eye, direction, object_edges(index))
+                messages = check_boundaries(marked, motion_boundaries(flow, index))
+            for message in messages:
                 yield self._file("motion_boundaries", eye, direction), message
+
+    def _flow_at(
+        self, caster: SceneRayCaster, eye: Eye, direction: Direction, where: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """(H, W, 2) the geometry's flow at some pixels (H, W), NaN at all others."""
+        flow = np.full((*where.shape, 2), np.nan, np.float32)
+        if where.any():
+            instant = self.samples[0].frame - FIRST_FRAME
+            flow[where] = PixelSurfaces(caster, eye, instant, *np.nonzero(where)).flow(direction)
+        return flow

@@ -13,7 +13,7 @@ import fsspec
 from datagen.dataset.integrity import compare_open
 from datagen.dataset.manifest import FileEntry
 from datagen.errors import DatasetError
-from datagen.sources.webdataset import INDEX_NAME, ShardSetIndex, read_index
+from datagen.sources.webdataset import INDEX_NAME, ShardSetIndex, read_index, scene_of
 from datagen.verify.report import Problem, VerifyReport
 from stereoforge_kit.files import LocalTree, Tree
 
@@ -50,7 +50,7 @@ def verify_shards(
     keys = [key for keys in index.shards.values() for key in keys]
     return VerifyReport(
         root=tree.name,
-        scenes=len({key.rpartition("-")[0] for key in keys}),
+        scenes=len(set(map(scene_of, keys))),
         frames=len(keys),
         files=len(index.files),
         bytes_read=size,

@@ -1,1 +1,1 @@
-"""The methods that are compared, ours and the baselines: one module each, found by `refine.methods.base`."""
+"""The rivals that ours is compared with: one module each, found by `refine.registry`."""

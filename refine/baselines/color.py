@@ -14,9 +14,8 @@ import numpy as np
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.energy.parameters import MRFParameters
 from refine.energy.system import Form
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
-from refine.methods.ours import Ours
-from refine.mrf.solve import SolverName
+from refine.method import EvaluationFrame, Method, MethodOutput, mrf_inputs
+from refine.mrf.solve import SolverName, solve_mrf
 
 _DIRECT_UP_TO_PIXELS = 200_000
 
@@ -56,11 +55,14 @@ class Color(Method):
     that no measure shows."""
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Refine with the data and colour terms alone."""
         parameters = MRFParameters(0.0, self.beta, self.sigma_r, self.confidence_floor)
         # With alpha = 0 the gradient counts for nothing, whatever it is.
         level = np.zeros((*frame.disparity.shape, 2), np.float32)
         # The multigrid cycle is made for the gradient term's couplings; without them it takes hundreds of iterations,
         # and a factorisation of a smaller image less than half of their time.
         solver: SolverName = "direct" if frame.disparity.size <= _DIRECT_UP_TO_PIXELS else "auto"
-        method = Ours(parameters, self.shape, self.form, solver, self.tolerance)
-        return method.run(replace(frame, gradient=level))
+        disparity, confidence, _, image = mrf_inputs(self, replace(frame, gradient=level))
+        shaped = self.shape.apply(confidence)
+        solution = solve_mrf(disparity, shaped, level, image, parameters, self.form, solver, self.tolerance)
+        return MethodOutput(disparity=solution.disparity.astype(np.float32))

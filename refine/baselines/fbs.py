@@ -1,4 +1,4 @@
-"""The fast bilateral solver: disparities alike wherever place and colour are alike.
+"""The fast bilateral solver: pixels close in position and colour get similar disparities.
 
 J. T. Barron, B. Poole, "The Fast Bilateral Solver", ECCV 2016; the simplified grid of J. T. Barron, A. Adams,
 Y. Shih, C. Hernandez, "Fast Bilateral-Space Stereo for Synthetic Defocus", CVPR 2015.
@@ -14,7 +14,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.matching import fill_nearest
 
 Floats = NDArray[np.float64]
@@ -59,9 +60,10 @@ class FBS(Method):
         for name in ("sigma_spatial_px", "sigma_luma", "sigma_chroma", "smoothness", "confidence_floor"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"the bilateral solver's {name} must be positive, got {value}")
+                raise InputError(f"the bilateral solver's {name} must be positive, got {value}")
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Filter the frame's initial disparity, weighted by its confidence."""
         assert frame.confidence is not None
         unknown = np.isnan(frame.disparity)
         trust = np.where(unknown, 0, frame.confidence).astype(np.float64)

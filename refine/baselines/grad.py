@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.energy.parameters import MRFParameters
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
-from refine.methods.ours import Ours
+from refine.method import EvaluationFrame, Method, MethodOutput, mrf_inputs
+from refine.mrf.solve import solve_mrf
 
 
 @dataclass(frozen=True)
@@ -34,5 +36,8 @@ class Grad(Method):
     shape: ConfidenceShape = field(default_factory=ConfidenceShape)
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Refine with the data and gradient terms alone."""
         parameters = MRFParameters(self.alpha, 0.0, self.sigma_r, self.confidence_floor)
-        return Ours(parameters, self.shape).run(frame)
+        disparity, confidence, gradient, image = mrf_inputs(self, frame)
+        solution = solve_mrf(disparity, self.shape.apply(confidence), gradient, image, parameters)
+        return MethodOutput(disparity=solution.disparity.astype(np.float32))

@@ -1,11 +1,11 @@
-"""The paper's rival DispNetCorr1D_F: the regressor fine-tuned so that its gradients fit, instead of refined."""
+"""The paper's rival DispNetCorr1D_F: a regressor fine-tuned on gradients in place of refinement."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 
 
 @dataclass(frozen=True)
@@ -21,4 +21,5 @@ class RegressorF(Method):
     needs: ClassVar[frozenset[str]] = frozenset({"fine_tuned"})
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Hand on the fine-tuned regressor's disparity, (H, W) in pixels."""
         return MethodOutput(disparity=frame.fine_tuned, seconds=frame.seconds.get("fine_tuned", 0.0))

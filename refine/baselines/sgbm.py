@@ -1,11 +1,11 @@
-"""Semi-global block matching: the rival that never learned anything."""
+"""Semi-global block matching, the rival without learning."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 from stereoforge_kit.matching import SGBMParameters, fill_background, match_sgbm
 
 
@@ -31,5 +31,6 @@ class SGBM(Method):
     parameters: SGBMParameters = field(default_factory=SGBMParameters)
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Match the pair, (H, W) in pixels."""
         assert frame.right is not None
         return MethodOutput(fill_background(match_sgbm(frame.image, frame.right, self.parameters)))

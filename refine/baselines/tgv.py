@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from refine.energy.confidence_shape import ConfidenceShape
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.matching import fill_nearest
 
 Map = NDArray[np.float32]
@@ -68,11 +69,12 @@ class TGV(Method):
         for name in ("alpha1", "alpha0", "data_weight", "tensor_exponent", "iterations"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"TGV's {name} must be positive, got {value}")
+                raise InputError(f"TGV's {name} must be positive, got {value}")
         if not self.tensor_strength >= 0:
-            raise ValueError(f"TGV's tensor_strength must be at least 0, got {self.tensor_strength}")
+            raise InputError(f"TGV's tensor_strength must be at least 0, got {self.tensor_strength}")
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Minimise the energy from the frame's initial disparity, weighted by its confidence."""
         assert frame.confidence is not None
         trust = np.where(np.isnan(frame.disparity), 0, self.shape.apply(frame.confidence))
         disparity, _ = self.solve(fill_nearest(frame.disparity), trust.astype(np.float32), frame.image)

@@ -1,4 +1,4 @@
-"""Weighted median filter: the common way to clean a disparity map along image edges.
+"""Weighted median filter guided by the image.
 
 Z. Ma, K. He, Y. Wei, J. Sun, E. Wu, "Constant time weighted median filtering for stereo matching and beyond", ICCV
 2013; Q. Zhang, L. Xu, J. Jia, "100+ times faster weighted median filter (WMF)", CVPR 2014.
@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
+from stereoforge_kit.errors import InputError
 
 LARGEST_SQUARED_DIFFERENCE = 3 * 255**2
 
@@ -38,12 +39,13 @@ class WMF(Method):
 
     def __post_init__(self) -> None:
         if self.radius_px < 0 or not self.sigma > 0:
-            raise ValueError(
+            raise InputError(
                 f"the weighted median needs a radius of at least 0 and a positive sigma, got {self.radius_px} "
                 f"and {self.sigma}"
             )
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Filter the frame's initial disparity."""
         return MethodOutput(weighted_median(frame.disparity, frame.image, self.radius_px, self.sigma))
 
 

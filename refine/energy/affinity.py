@@ -1,4 +1,4 @@
-"""How strongly neighbouring pixels are tied together, read off the image."""
+"""Affinities between neighbouring pixels, computed from the image: the energy's phi and w."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 
 def edge_weights(image: NDArray[np.uint8], sigma_r: float) -> tuple[Floats, Floats]:
-    """phi: close to 1 in smooth areas, close to 0 across image edges.
+    """Weights phi of the gradient term: close to 1 in smooth areas, close to 0 across image edges.
 
     phi_x = exp(-|I(y, x + 1) - I(y, x)|^2 / (2 sigma_r^2)), the norm taken over the three channels in 0..255
     units; phi_y alike, downwards (paper, Eq. 6). In the last column (row) the difference is 0, so phi_x
@@ -37,7 +37,7 @@ def edge_weights(image: NDArray[np.uint8], sigma_r: float) -> tuple[Floats, Floa
 
 
 def neighbor_weights(image: NDArray[np.uint8]) -> Floats:
-    """The colour term's w_pq: how alike a pixel and each of its eight neighbours are, summing to 1 a pixel.
+    """Weights w_pq of the colour term: the similarity of a pixel to its eight neighbours, which sums to 1.
 
     With g the mean of red, green and blue over 255, v_p its population variance in the 3x3 window around p
     (the part of it inside the image) and m_p the smallest (g_p - g_q)^2 of the neighbours:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stereoforge_kit.errors import InputError
+
 
 @dataclass(frozen=True)
 class MRFParameters:
@@ -26,8 +28,8 @@ class MRFParameters:
         for name in ("alpha", "beta", "confidence_floor"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0):
-                raise ValueError(f"the MRF's {name} must be finite and at least 0, got {value}")
+                raise InputError(f"the MRF's {name} must be finite and at least 0, got {value}")
         if not (np.isfinite(self.sigma_r) and self.sigma_r > 0):
-            raise ValueError(f"the MRF's sigma_r must be positive, got {self.sigma_r}")
+            raise InputError(f"the MRF's sigma_r must be positive, got {self.sigma_r}")
         if self.confidence_floor > 1:
-            raise ValueError(f"the MRF's confidence_floor must be at most 1, got {self.confidence_floor}")
+            raise InputError(f"the MRF's confidence_floor must be at most 1, got {self.confidence_floor}")

@@ -71,18 +71,6 @@ class MRFSystem:
             color = self._laplacian_transposed @ color
         return sp.csr_array(self.five_point + color)
 
-    def m_matrix(self) -> sp.csr_array:
-        """A symmetric 9-point M-matrix close to A, which multigrid handles well where A itself is hard.
-
-        The colour term becomes the graph Laplacian with edge weights beta (phibar_p w_pq + phibar_q w_qp).
-        Twice that or half of it changes the number of iterations by no more than a third, in either form.
-        """
-        weighted = sp.diags_array(self.color_weight) @ (
-            sp.eye_array(self.laplacian.shape[0]) - self.laplacian
-        )
-        edges = weighted + weighted.T
-        return sp.csr_array(self.five_point + sp.diags_array(edges.sum(axis=1)) - edges)
-
     def relative_residual(self, x: Floats) -> float:
         """|b - A x| / |b|, or |A x| where b is 0."""
         size = float(np.linalg.norm(self.right_hand_side))
@@ -102,7 +90,7 @@ def build_system(
     form: Form,
     gradient_factor: Floats | None = None,
 ) -> MRFSystem:
-    """Put a refinement problem into equations (shapes as for `refine.refine_disparity`, not checked here).
+    """Build the linear system of a refinement problem (shapes as for `refine.refine_disparity`, not checked here).
 
     `gradient_factor`, (H, W, 2), multiplies the weights of the gradient terms.
     """

@@ -1,4 +1,4 @@
-"""A whole evaluation on disk and back: long studies keep what they have finished.
+"""Evaluations on disk, so that long studies keep what they have finished.
 
 `evaluation.json` holds the records, `evaluation.npz` their arrays, which the JSON refers to by name. Reading runs no
 code: the JSON is structured into typed records, and the arrays are read without pickle.
@@ -17,16 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from refine.evaluation.results import EvaluatedSet
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_bytes, write_text
 
 FORMAT = 1
 RECORDS = "evaluation.json"
 ARRAYS = "evaluation.npz"
-
-
-def has_evaluation(folder: Path) -> bool:
-    """Whether a whole evaluation is there: its records are written last."""
-    return (folder / RECORDS).is_file()
 
 
 def write_evaluation(folder: Path, evaluated: EvaluatedSet) -> None:
@@ -58,7 +54,7 @@ def read_evaluation(folder: Path) -> EvaluatedSet:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(document, dict) or document.get("format") != FORMAT:
-            raise ValueError(f"is not of format {FORMAT}")
+            raise InputError(f"is not of format {FORMAT}")
         with np.load(folder / ARRAYS, allow_pickle=False) as arrays:
             converter = cattrs.Converter(forbid_extra_keys=True)
             converter.register_structure_hook_func(_is_array_type, lambda name, _: arrays[name])
@@ -76,7 +72,7 @@ def read_evaluation(folder: Path) -> EvaluatedSet:
             if isinstance(error, cattrs.BaseValidationError)
             else error
         )
-        raise ValueError(f"{path}: is not a whole evaluation ({reason})") from error
+        raise InputError(f"{path}: is not a whole evaluation ({reason})") from error
     return evaluated
 
 

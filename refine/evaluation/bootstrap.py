@@ -1,4 +1,4 @@
-"""How far the measures might be off because only these scenes were rendered: bootstrap confidence intervals.
+"""Bootstrap confidence intervals of the measures, with scenes as the unit of resampling.
 
 Frames of one scene share its objects, textures and camera, and pixels share everything, so neither are
 independent draws. Whole scenes are: they are drawn with replacement, as many as there are, and every measure is
@@ -26,7 +26,7 @@ FEWEST_SCENES = 5
 
 @dataclass(frozen=True)
 class Interval:
-    """A range that holds the measure of the world behind the scenes in `LEVEL` of such studies; NaN if unknown."""
+    """A confidence interval of level `LEVEL`; NaN where it is not known."""
 
     low: float = float("nan")
     high: float = float("nan")

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from refine.evaluation.pooling import MethodPool, MethodScore
-from refine.methods.base import EvaluationFrame, Method
-from refine.methods.registry import default_methods
+from refine.method import EvaluationFrame, Method
 from refine.metrics import SparsificationCurve, bad_pixel_rate, optimal_auc, sparsification_curve
+from refine.registry import default_methods
+from stereoforge_kit.errors import InputError
 
 __all__ = [
     "Evaluation",
@@ -96,7 +97,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What came out of `evaluate`."""
+    """The result of `evaluate`."""
 
     options: EvaluationOptions
     labels: dict[str, str]
@@ -159,7 +160,7 @@ class _Run:
     def __init__(self, methods: tuple[Method, ...], options: EvaluationOptions) -> None:
         names = [method.name for method in methods]
         if len(set(names)) != len(names):
-            raise ValueError(f"every method may be evaluated once, got {', '.join(names)}")
+            raise InputError(f"every method may be evaluated once, got {', '.join(names)}")
         self.methods = methods
         self.options = options
         self.skipped: dict[str, str] = {}
@@ -177,7 +178,7 @@ class _Run:
         pools, disparities = {}, {}
         for method in self.methods:
             if lacking := method.lacks(frame):
-                raise ValueError(f"frame {frame.name} comes without {lacking}, unlike the first frame")
+                raise InputError(f"frame {frame.name} comes without {lacking}, unlike the first frame")
             if not self.scores:
                 # After an install this compiles for minutes, which are not the method's time.
                 method.run(frame)
@@ -197,7 +198,7 @@ class _Run:
     def finish(self) -> Evaluation:
         """Pool the frames taken."""
         if not self.scores:
-            raise ValueError("there is no frame to evaluate")
+            raise InputError("there is no frame to evaluate")
         return Evaluation(
             options=self.options,
             labels={method.name: method.label for method in self.methods},
@@ -218,7 +219,7 @@ class _Run:
         }
         self.methods = tuple(method for method in self.methods if method.name not in self.skipped)
         if not self.methods:
-            raise ValueError(f"no method can run: {'; '.join(self.skipped.values())}")
+            raise InputError(f"no method can run: {'; '.join(self.skipped.values())}")
         self.pools = {method.name: self._empty_pool() for method in self.methods}
         self.judged = "ours" if "ours" in self.pools else self.methods[0].name
 

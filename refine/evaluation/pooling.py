@@ -1,4 +1,4 @@
-"""Sums over pixels from which every measure of a method follows; the sums of frames add up to those of a set."""
+"""Sums over pixels from which every measure of a method follows. The sums of frames add up to those of a set."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from refine.methods.base import EvaluationFrame, MethodOutput
+from refine.method import EvaluationFrame, MethodOutput
 from refine.metrics import D1Pool, ErrorPool, GradientPool, KittiD1, forward_gradient, smooth_mask
+from stereoforge_kit.errors import InputError
 
 REGIONS = ("all", "occ")
-"""All: every pixel with ground truth. Occ: those hidden from, or outside, the other view."""
+"""All: every pixel with ground truth. Occ: those occluded in the other view or out of its frame."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ class MethodPool:
         return cls(gradient_threshold, regions, GradientPool(), GradientPool(), D1Pool())
 
     def add(self, frame: EvaluationFrame, output: MethodOutput, seconds: float) -> None:
-        """Take in one frame. Raises ValueError for an output without disparity and gradient."""
+        """Add one frame. Raises InputError for an output with neither a disparity nor a gradient."""
         if output.disparity is not None:
             self.regions["all"].add(output.disparity, frame.truth)
             self.regions["occ"].add(output.disparity, frame.truth, frame.occlusion > 0)
@@ -105,7 +106,7 @@ class MethodPool:
         elif output.disparity is not None:
             gradient = forward_gradient(output.disparity)
         else:
-            raise ValueError("a method gave neither a disparity nor a gradient")
+            raise InputError("a method gave neither a disparity nor a gradient")
         truth = forward_gradient(frame.truth)
         self.masked.add(gradient, truth, smooth_mask(truth, self.gradient_threshold))
         self.everywhere.add(gradient, truth)
@@ -113,7 +114,7 @@ class MethodPool:
         self.frames += 1
 
     def merge(self, other: MethodPool) -> None:
-        """Take in what another pool has summed."""
+        """Add the sums of another pool."""
         for name, pool in other.regions.items():
             self.regions[name].merge(pool)
         self.masked.merge(other.masked)

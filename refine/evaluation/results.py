@@ -1,4 +1,4 @@
-"""Evaluations' numbers as plain rows: the one source of the report's tables, `results.csv` and `results.json`."""
+"""The numbers of evaluations as plain rows: the source of the report's tables, `results.csv` and `results.json`."""
 
 from __future__ import annotations
 

@@ -16,10 +16,11 @@ from typing import Any
 import cattrs
 
 from refine.evaluation.tuning import Trial, TunedMethod
-from refine.methods.base import Method
+from refine.method import Method
 from refine.methods.ours import Ours
 from refine.methods.ours_quadratic import OursQuadratic
-from refine.methods.registry import default_methods, known_methods
+from refine.registry import default_methods, known_methods
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_text
 
 FORMAT = 1
@@ -39,7 +40,7 @@ class Settings:
     """What the parameters were validated on, and how."""
 
     def method(self, name: str) -> Method:
-        """The named method, with validated parameters if there are any; raises ValueError if there is none such."""
+        """The named method, with validated parameters if there are any; raises InputError if there is none."""
         return self.methods[name] if name in self.methods else default_methods((name,))[0]
 
     @property
@@ -62,7 +63,7 @@ class Settings:
 
 
 def write_settings(path: Path, tuned: Mapping[str, TunedMethod], about: Mapping[str, Any]) -> None:
-    """Write what was found, in one step."""
+    """Write the file of parameters in one step."""
     document = {
         "format": FORMAT,
         "about": dict(about),
@@ -76,31 +77,32 @@ def read_settings(path: Path) -> Settings:
     """Read a file of parameters.
 
     Raises:
-        ValueError: If it is missing, damaged, of another version, or sets what there is not; names the file.
+        InputError: If it is missing, damaged, of another version, or sets a parameter that does not exist. The message
+            names the file.
     """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: cannot be read as a file of parameters ({error})") from error
+        raise InputError(f"{path}: cannot be read as a file of parameters ({error})") from error
     if not isinstance(document, dict) or document.keys() != {"format", "about", "methods", "trials"}:
-        raise ValueError(f"{path}: is not a file of parameters that stereoforge tune wrote")
+        raise InputError(f"{path}: is not a file of parameters that stereoforge tune wrote")
     if document["format"] != FORMAT:
-        raise ValueError(f"{path}: has format {document['format']}, this version reads {FORMAT}")
+        raise InputError(f"{path}: has format {document['format']}, this version reads {FORMAT}")
     known = known_methods()
     methods: dict[str, Method] = {}
     trials: dict[str, tuple[Trial, ...]] = {}
     try:
         for name, values in document["methods"].items():
             if name not in known:
-                raise ValueError(f"there is no method {name!r}")
+                raise InputError(f"there is no method {name!r}")
             methods[name] = _CONVERTER.structure(values, known[name])
         for name, tried in document["trials"].items():
             trials[name] = tuple(_trial(values) for values in tried)
     except (cattrs.BaseValidationError, cattrs.StructureHandlerNotFoundError) as error:
         reason = "; ".join(cattrs.transform_error(error))
-        raise ValueError(f"{path}: does not set the parameters of {name} ({reason})") from error
+        raise InputError(f"{path}: does not set the parameters of {name} ({reason})") from error
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise ValueError(f"{path}: is not a whole file of parameters ({error})") from error
+        raise InputError(f"{path}: is not a whole file of parameters ({error})") from error
     return Settings(methods, trials, document["about"])
 
 

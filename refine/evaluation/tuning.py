@@ -1,4 +1,4 @@
-"""Choosing a method's parameters on frames with ground truth: a coordinate search over short lists of values.
+"""Choose a method's parameters on frames with ground truth: a coordinate search over short lists of values.
 
 Each method names its parameters and their values in order (`Method.search`). The search starts from the defaults and
 takes the parameters in turn: it moves along a parameter's values, up and else down, as long as the objective falls,
@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Literal
 
-from refine.methods.base import EvaluationFrame, Method
+from refine.method import EvaluationFrame, Method
 from refine.metrics import ErrorPool, GradientPool, forward_gradient, smooth_mask
+from stereoforge_kit.errors import InputError
 
 Objective = Literal["balanced", "bad", "epe", "gradient"]
 """Error relative to the initial disparity's: the mean of the three, bad pixels, end-point error, gradient error."""
@@ -78,7 +79,7 @@ def measure(method: Method, frames: Sequence[EvaluationFrame], bad_threshold: fl
     for frame in frames:
         disparity = method.run(frame).disparity
         if disparity is None:
-            raise ValueError(
+            raise InputError(
                 f"{method.name} gives no disparity, so its parameters cannot be validated by one"
             )
         truth = forward_gradient(frame.truth)
@@ -107,7 +108,7 @@ def tune_method(
 
     Args:
         kind: The method; its `search` may be empty, and then its defaults are tried only.
-        evaluate: The objective of a setting, to be made small.
+        evaluate: The objective of a setting, which is minimised.
         known: Trials of an earlier search with the same `evaluate`, which are not repeated.
         on_trial: Called after each new trial.
     """

@@ -1,4 +1,4 @@
-"""What the forest sees of a pixel: twelve numbers from the disparity, its consistency, the image and the place."""
+"""The forest's twelve features of a pixel, from disparity, left-right consistency, image and position."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Growing the forest with scikit-learn."""
+"""Fit the forest with scikit-learn."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from sklearn.ensemble import RandomForestClassifier
 
 from refine.forest.features import confidence_features
 from refine.forest.forest import LEAF, Forest
+from stereoforge_kit.errors import InputError
 
 Map = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class ForestConfig:
-    """How the forest grows. Park and Yoon's is not published; 50 trees are what replications of its kind use."""
+    """Size of the forest. Park and Yoon's code is not published; replications use 50 trees."""
 
     trees: int = 50
     samples: int = 400_000
@@ -33,7 +34,7 @@ class ForestConfig:
 
 @dataclass(frozen=True)
 class ForestFrame:
-    """What the forest learns from in a frame: (H, W) maps and the (H, W, 3) image."""
+    """One training frame of the forest: (H, W) maps and the (H, W, 3) image."""
 
     image: NDArray[np.uint8]
     truth: Map
@@ -49,7 +50,7 @@ def grow_forest(frames: Iterable[ForestFrame], count: int, config: ForestConfig,
         count: How many they are, so that each gives its share of the samples.
 
     Raises:
-        ValueError: If no pixel has ground truth, or all of them are right, or all wrong.
+        InputError: If no pixel has ground truth, or all of them are right, or all wrong.
     """
     rng = np.random.default_rng(seed)
     features, labels = [], []
@@ -62,7 +63,7 @@ def grow_forest(frames: Iterable[ForestFrame], count: int, config: ForestConfig,
         labels.append(right.ravel()[drawn])
     answers = np.concatenate(labels) if labels else np.empty(0, bool)
     if len(np.unique(answers)) < 2:
-        raise ValueError("a confidence can be learned only from frames with right and wrong pixels")
+        raise InputError("a confidence can be learned only from frames with right and wrong pixels")
     grown = RandomForestClassifier(
         n_estimators=config.trees,
         min_samples_leaf=config.leaf_samples,

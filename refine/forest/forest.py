@@ -1,4 +1,4 @@
-"""A random forest as plain arrays: evaluated here, stored without pickle, so that reading one runs no code."""
+"""A random forest as plain arrays, evaluated here and stored without pickle, so that reading one runs no code."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from refine.forest.features import FEATURES, confidence_features
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_bytes
 
 FORMAT = "1"
@@ -21,8 +22,8 @@ LEAF = -1
 """In place of a feature's number."""
 
 
-class ForestError(ValueError):
-    """A file is no forest, or not one for these features."""
+class ForestError(InputError):
+    """A file holds no forest, or one for other features."""
 
 
 @dataclass(frozen=True)

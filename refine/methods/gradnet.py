@@ -1,11 +1,11 @@
-"""The gradients that guide the refinement, measured by themselves (the paper's Table 1)."""
+"""GradNet's gradients by themselves (the paper's Table 1)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 
 
 @dataclass(frozen=True)
@@ -17,4 +17,5 @@ class GradNet(Method):
     needs: ClassVar[frozenset[str]] = frozenset({"gradient"})
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Hand on the predicted gradient, (H, W, 2) in pixels per pixel."""
         return MethodOutput(gradient=frame.gradient, seconds=frame.seconds.get("gradient", 0.0))

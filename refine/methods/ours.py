@@ -11,17 +11,18 @@ from numpy.typing import NDArray
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.energy.parameters import MRFParameters
 from refine.energy.system import Form
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput, mrf_inputs
 from refine.mrf.robust import check_scale, curvature_factor, solve_robust
 from refine.mrf.solve import DEFAULT_TOLERANCE, MRFSolution, SolverName, solve_mrf
+from stereoforge_kit.errors import InputError
 
 
 @dataclass(frozen=True)
 class Ours(Method):
     """The MRF with ConfNet's confidence and GradNet's gradient; the defaults are the paper's.
 
-    Validation may choose the shape of the gradient term too: quadratic as the paper's (`ours_quadratic` is that
-    one's row), or robust (`refine.mrf.robust`), so that disparities may step where the image does not.
+    Validation also chooses the penalty of the gradient term: quadratic as in the paper (`ours_quadratic` is that row),
+    or robust (`refine.mrf.robust`), so that disparities may step where the image does not.
     """
 
     name: ClassVar[str] = "ours"
@@ -56,16 +57,17 @@ class Ours(Method):
             return
         check_scale(self.gradient_scale)
         if self.form != "exact":
-            raise ValueError(
+            raise InputError(
                 "the paper's form of the MRF has a quadratic gradient term, so no gradient_scale"
             )
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Refine the frame's initial disparity. Raises InputError for a frame without confidence or gradient."""
         solution = self.solve(*mrf_inputs(self, frame))
         return MethodOutput(disparity=solution.disparity.astype(np.float32))
 
     def deviation(self, frame: EvaluationFrame, samples: int) -> NDArray[np.float32]:
-        """The posterior's standard deviation in pixels, of the exact form; sampling takes a solve each."""
+        """Standard deviation (H, W) of the posterior of the exact form, in pixels. Each sample takes one solve."""
         return self.sample(*mrf_inputs(self, frame), samples)
 
     def sample(
@@ -104,14 +106,3 @@ class Ours(Method):
         if self.gradient_scale is None:
             return solve_mrf(*inputs, self.form, self.solver, self.tolerance)
         return solve_robust(*inputs, self.gradient_scale, solver=self.solver, tolerance=self.tolerance)
-
-
-def mrf_inputs(
-    method: Method, frame: EvaluationFrame
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
-    """What a method with the MRF's inputs takes of a frame; ValueError if it lacks one of them."""
-    if frame.confidence is None or frame.gradient is None:
-        raise ValueError(
-            f"{method.label} needs {method.lacks(frame)}, which frame {frame.name} comes without"
-        )
-    return frame.disparity, frame.confidence, frame.gradient, frame.image

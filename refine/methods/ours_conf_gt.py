@@ -1,4 +1,4 @@
-"""The upper bound of the paper's Table 3: the MRF told by the ground truth which pixels are right."""
+"""The upper bound of the paper's Table 3: the MRF whose confidence is taken from the ground truth."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 from refine.methods.ours import Ours
 
 
@@ -29,5 +29,6 @@ class OursConfGT(Method):
     """In pixels; ConfNet's label."""
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Refine with the confidence that the ground truth gives."""
         right = np.abs(frame.disparity - frame.truth) <= self.threshold
         return self.mrf.run(replace(frame, confidence=right.astype(np.float32)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from refine.methods.ours import Ours
+from stereoforge_kit.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -19,4 +20,4 @@ class OursQuadratic(Ours):
 
     def __post_init__(self) -> None:
         if self.gradient_scale is not None:
-            raise ValueError("the paper's energy has a quadratic gradient term, so no gradient_scale")
+            raise InputError("the paper's energy has a quadratic gradient term, so no gradient_scale")

@@ -1,11 +1,11 @@
-"""The initial disparity as it is: what every other row starts from."""
+"""The initial disparity, which every other method starts from."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 
 
 @dataclass(frozen=True)
@@ -16,4 +16,5 @@ class Regressor(Method):
     label: ClassVar[str] = "Regressor"
 
     def run(self, frame: EvaluationFrame) -> MethodOutput:
+        """Hand on the initial disparity, (H, W) in pixels."""
         return MethodOutput(disparity=frame.disparity, seconds=frame.seconds.get("disparity", 0.0))

@@ -1,4 +1,4 @@
-"""How sure the MRF is of each refined disparity.
+"""The posterior uncertainty of each refined disparity.
 
 The energy E is quadratic, so exp(-E) is a Gaussian over disparity maps with the refined one as its mean and
 (2 A)^-1 as its covariance. Samples of it cost one solve each (Papandreou and Yuille, "Gaussian sampling by
@@ -18,8 +18,10 @@ from refine.energy.affinity import NEIGHBORS, Floats
 from refine.energy.parameters import MRFParameters
 from refine.mrf.solve import checked_problem
 from refine.solvers.linear import SolverError
-from refine.solvers.multigrid import GivenSystem
-from refine.solvers.stencils import Couplings, couplings_of, crop, data_weight
+from refine.solvers.multigrid import MultigridSolver
+from refine.solvers.stencil.padding import crop
+from refine.solvers.stencil.weights import StencilWeights, data_weight, stencil_weights
+from stereoforge_kit.errors import InputError
 
 TOLERANCE = 1e-3
 """Relative residual of each sample's solve: far below the sampling error."""
@@ -37,7 +39,8 @@ def posterior_deviation(
 ) -> NDArray[np.float32]:
     """Standard deviation of each refined disparity under the MRF's own Gaussian, exact form.
 
-    In pixels if the energy is taken at its word; its order, least sure last, is what it is good for.
+    It is in pixels if the energy is taken as a log-likelihood. Use its order rather than its size: it tells which
+    disparities are least certain.
 
     Args:
         disparity: As for `refine.refine_disparity`, like the next four.
@@ -58,35 +61,35 @@ def posterior_deviation(
         refine.SolverError: If the system is singular or a solve does not converge.
     """
     if samples < 1:
-        raise ValueError(f"samples must be at least 1, got {samples}")
+        raise InputError(f"samples must be at least 1, got {samples}")
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
     problem = replace(problem, gradient_factor=gradient_factor)
-    parts = couplings_of(problem, data_weight(problem))
-    system = GivenSystem(parts)
+    weights = stencil_weights(problem, data_weight(problem))
+    solver = MultigridSolver(weights)
     rng = np.random.default_rng(seed)
     total = np.zeros(problem.shape)
     for _ in range(samples):
-        noise = _perturbation(parts, rng)
+        noise = _perturbation(weights, rng)
         size = float(np.linalg.norm(noise))
-        solved = system.solve(noise, TOLERANCE)
-        if not solved.residual <= TOLERANCE * size:
+        solved = solver.solve(noise, TOLERANCE)
+        if not solved.residual_norm <= TOLERANCE * size:
             raise SolverError(
-                f"a sample of the posterior stopped at a relative residual of {solved.residual / size:.1e}, "
+                f"a sample of the posterior stopped at a relative residual of {solved.residual_norm / size:.1e}, "
                 f"short of {TOLERANCE:.1e}"
             )
         total += crop(solved.x) ** 2
     return np.sqrt(total / samples / 2).astype(np.float32)
 
 
-def _perturbation(parts: Couplings, rng: np.random.Generator) -> Floats:
+def _perturbation(weights: StencilWeights, rng: np.random.Generator) -> Floats:
     """F' n, padded: every term of the energy pushed by noise of its own weight."""
-    shape = parts.tau.shape
-    push: Floats = np.sqrt(parts.tau) * rng.standard_normal(shape)
-    for axis, weight in ((1, parts.axial[0]), (0, parts.axial[1])):
+    shape = weights.tau.shape
+    push: Floats = np.sqrt(weights.tau) * rng.standard_normal(shape)
+    for axis, weight in ((1, weights.gradient[0]), (0, weights.gradient[1])):
         flow = np.sqrt(weight) * rng.standard_normal(shape)
         push += np.roll(flow, 1, axis) - flow
-    flow = np.sqrt(parts.color) * rng.standard_normal(shape)
+    flow = np.sqrt(weights.color) * rng.standard_normal(shape)
     push += flow
-    for (dy, dx), weight in zip(NEIGHBORS, parts.weights, strict=True):
+    for (dy, dx), weight in zip(NEIGHBORS, weights.neighbors, strict=True):
         push -= np.roll(weight * flow, (dy, dx), (0, 1))
     return push

@@ -1,4 +1,4 @@
-"""The MRF with a gradient term that lets a few differences be as large as they want to be.
+"""The MRF with a robust gradient term, which tolerates a few large differences.
 
 The paper's gradient term is quadratic: where the disparity steps and the image has no edge to say so, one step of 20 px
 costs what 400 steps of 1 px do, so the solution smears it, and alpha cannot be large. Here the term is Charbonnier's,
@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from refine.energy.affinity import Floats
 from refine.energy.parameters import MRFParameters
 from refine.mrf.solve import DEFAULT_TOLERANCE, MRFSolution, SolverName, checked_problem, solve_problem
+from stereoforge_kit.errors import InputError
 
 DEFAULT_REWEIGHTINGS = 4
 WEIGHING_TOLERANCE = 1e-4
@@ -63,7 +64,7 @@ def solve_robust(
     """
     check_scale(scale)
     if reweightings < 0:
-        raise ValueError(f"there cannot be {reweightings} reweightings")
+        raise InputError(f"there cannot be {reweightings} reweightings")
     began = time.perf_counter()
     problem = checked_problem(disparity, confidence, gradient, image, parameters, "exact")
     tolerances = [max(tolerance, WEIGHING_TOLERANCE)] * reweightings + [tolerance]
@@ -79,9 +80,9 @@ def solve_robust(
 
 
 def check_scale(scale: float) -> None:
-    """Raises ValueError unless it can be a scale of the gradient term."""
+    """Raise InputError unless the value can be a scale of the gradient term: finite and positive."""
     if not (np.isfinite(scale) and scale > 0):
-        raise ValueError(f"the gradient term's scale must be positive, got {scale}")
+        raise InputError(f"the gradient term's scale must be positive, got {scale}")
 
 
 def gradient_factor(disparity: Floats, gradient: Floats, scale: float) -> Floats:

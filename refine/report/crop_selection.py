@@ -1,4 +1,4 @@
-"""Where to look closely: the piece of a frame that shows a depth boundary (the paper's Fig. 1)."""
+"""Crops to look at closely: pieces of a frame along depth boundaries, as in the paper's Fig. 1."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def most_improved_boundary(
     truth: NDArray[np.float32],
     size: tuple[int, int],
 ) -> Window | None:
-    """The window in which refinement takes most error away along depth boundaries.
+    """The window in which refinement removes most error along depth boundaries.
 
     Args:
         initial, refined: (H, W) disparities before and after.
@@ -39,7 +39,7 @@ def most_improved_boundary(
 def worst_boundary(
     disparity: NDArray[np.float32], truth: NDArray[np.float32], size: tuple[int, int]
 ) -> Window | None:
-    """The window in which a disparity errs most along depth boundaries (see `most_improved_boundary`)."""
+    """The window with the largest error along depth boundaries (see `most_improved_boundary`)."""
     return _best_window(_capped_error(disparity, truth), truth, size)
 
 

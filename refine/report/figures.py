@@ -32,12 +32,12 @@ Map = NDArray[np.float32]
 
 PANEL_LONGEST = 960
 """Pictures of larger frames are shrunk to this, so that a report stays a few megabytes."""
-LENS_SIZE = (64, 96)
-LENS_ZOOM = 4
+CLOSE_UP_SIZE = (64, 96)
+CLOSE_UP_ZOOM = 4
 
 
 @dataclass(frozen=True)
-class Lens:
+class CloseUp:
     """A boundary close up, every pixel enlarged."""
 
     image: Picture
@@ -59,7 +59,7 @@ class PanelView:
     refined: Picture | None
     """None where nothing was refined, the judged method being the regressor itself."""
     refined_label: str
-    lens: Lens | None
+    close_up: CloseUp | None
 
 
 def panel_view(evaluation: Evaluation, panel: Panel, failure: bool = False) -> PanelView:
@@ -95,7 +95,7 @@ def panel_view(evaluation: Evaluation, panel: Panel, failure: bool = False) -> P
         initial=initial_picture,
         refined=refined_picture if evaluation.refines else None,
         refined_label=label,
-        lens=_lens(panel, refined, failure) if evaluation.refines else None,
+        close_up=_close_up(panel, refined, failure) if evaluation.refines else None,
     )
 
 
@@ -124,9 +124,9 @@ def panel_picture(view: PanelView) -> Picture:
     return stacked([side_by_side(pictures[start : start + 3]) for start in range(0, len(pictures), 3)])
 
 
-def lens_picture(lens: Lens) -> Picture:
+def close_up_picture(close_up: CloseUp) -> Picture:
     """A close-up's pictures side by side, as the paper's Fig. 1: image, initial, refined, ground truth."""
-    return side_by_side([lens.image, lens.initial, lens.refined, lens.truth])
+    return side_by_side([close_up.image, close_up.initial, close_up.refined, close_up.truth])
 
 
 def curve_figure(measured: Mapping[str, SparsificationCurve], bad_rate: float | None, title: str) -> Figure:
@@ -162,25 +162,27 @@ def auc_figure(frames: Sequence[FrameScore]) -> Figure:
     )
 
 
-def _lens(panel: Panel, refined: NDArray[np.float32], failure: bool) -> Lens | None:
+def _close_up(panel: Panel, refined: NDArray[np.float32], failure: bool) -> CloseUp | None:
     frame = panel.frame
     if failure:
         reason = "the depth boundary where the result is worst"
-        window = worst_boundary(refined, frame.truth, LENS_SIZE)
+        window = worst_boundary(refined, frame.truth, CLOSE_UP_SIZE)
     else:
         reason = "the depth boundary where refinement changes most for the better"
-        window = most_improved_boundary(frame.disparity, refined, frame.truth, LENS_SIZE)
+        window = most_improved_boundary(frame.disparity, refined, frame.truth, CLOSE_UP_SIZE)
     if window is None:
         return None
     truth = frame.truth[window]
     maximum = max(float(np.nanmax(truth)) * 1.1, 1.0)
     initial_view, refined_view, truth_view = (
-        enlarged(disparity_picture(values, maximum), LENS_ZOOM)
+        enlarged(disparity_picture(values, maximum), CLOSE_UP_ZOOM)
         for values in (frame.disparity[window], refined[window], truth)
     )
     rows, columns = window
     place = f"{reason}, columns {columns.start}–{columns.stop - 1}, rows {rows.start}–{rows.stop - 1}"
-    return Lens(enlarged(frame.image[window], LENS_ZOOM), initial_view, refined_view, truth_view, place)
+    return CloseUp(
+        enlarged(frame.image[window], CLOSE_UP_ZOOM), initial_view, refined_view, truth_view, place
+    )
 
 
 def _error(disparity: NDArray[np.float32], truth: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""One picture of one refinement: what went in, what came out."""
+"""One picture of one refinement: its inputs and its result."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def overview_picture(
     refined: ArrayLike,
     deviation: ArrayLike | None = None,
 ) -> Picture:
-    """Image, initial disparity, confidence and refined disparity, perhaps its deviation, labelled, with their scales.
+    """Image, initial disparity, confidence, refined disparity and, if given, its deviation, labelled, with scales.
 
     Both disparities have one scale, whose end is the 99.5th percentile of the refined one, so that a few wild
     pixels do not darken everything else.

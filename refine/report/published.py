@@ -111,9 +111,9 @@ _COUNTERPARTS = {
 
 
 def counterpart(family: str, split: str, table: int) -> str | None:
-    """The data set of the paper that a family of ours stands beside in one of its tables, a key of `PAPER`.
+    """The paper's data set (a key of `PAPER`) that a family of ours is compared with in one of its tables.
 
-    Table 5 has the validation part of FlyingThings3D only. None where the paper has nothing alike.
+    Table 5 has the validation part of FlyingThings3D only. None where the paper has no counterpart.
     """
     family = family.removesuffix("-final")
     if family in _FLYING:

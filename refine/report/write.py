@@ -16,8 +16,8 @@ from refine.evaluation.results import EvaluatedSet, mean_curves, results_csv, re
 from refine.report.figures import (
     PanelView,
     auc_figure,
+    close_up_picture,
     curve_figure,
-    lens_picture,
     panel_picture,
     panel_view,
 )
@@ -44,6 +44,7 @@ from refine.report.tables import (
     refined_confidence_table,
     summary_tiles,
 )
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_bytes, write_text
 from stereoforge_kit.viewing import render_page
 from stereoforge_kit.viewing.html import encoded
@@ -122,7 +123,7 @@ def write_report(
         ValueError: If there is no set, or two share a name.
     """
     if not sets or len({each.name for each in sets}) != len(sets):
-        raise ValueError("a report needs at least one set, and no two of one name")
+        raise InputError("a report needs at least one set, and no two of one name")
     files = ReportFiles(out / "report.html", out / "results.csv", out / "results.json", out / "figures")
     about = {"title": context.title, **context.facts, "limits": list(context.limits)}
     views = [_set_view(each, index, context.bootstrap_seed) for index, each in enumerate(sets)]
@@ -217,5 +218,5 @@ def _figure_files(view: SetView, compact: bool) -> Iterator[tuple[str, bytes]]:
     for number, panel in enumerate((*view.panels, *view.worst), start=1):
         if not compact:
             yield f"{panels}-{number}.png", encoded(panel_picture(panel))
-        if panel.lens is not None:
-            yield f"fig1-{number}.png", encoded(lens_picture(panel.lens))
+        if panel.close_up is not None:
+            yield f"fig1-{number}.png", encoded(close_up_picture(panel.close_up))

@@ -1,6 +1,7 @@
-"""Solvers of the MRF's linear system: one a module, each a function (problem, tolerance) -> LinearSolution.
+"""Solvers of the MRF's linear system A x = b, one a module: "direct", "cg" and "multigrid".
 
-Imported where they are used: the iterative ones bring numba along.
+Each is a function (problem, tolerance) -> LinearSolution, imported where it is used: the iterative ones bring numba
+along. `stencil` holds A and b without sparse matrices, `amg` the algebraic multigrid, `krylov` the iterations.
 """
 
 from __future__ import annotations
@@ -11,7 +12,16 @@ __all__ = ["LinearSolution", "Problem", "SolverError", "solve"]
 
 
 def solve(problem: Problem, solver: str, tolerance: float) -> LinearSolution:
-    """Run the solver of that name: "multigrid", "cg" or "direct"."""
+    """Solve a refinement's linear system.
+
+    Args:
+        problem: The refinement.
+        solver: "multigrid", "cg" or "direct".
+        tolerance: Relative residual |b - A x| / |b| at which the iterative solvers stop.
+
+    Raises:
+        SolverError: If the matrix is singular.
+    """
     if solver == "multigrid":
         from refine.solvers.multigrid import solve_multigrid
 

@@ -1,4 +1,4 @@
-"""Factorising the matrix: the reference, exact to rounding, minutes for half a million pixels."""
+"""Sparse direct solvers: the reference, exact to rounding, minutes for half a million pixels."""
 
 from __future__ import annotations
 
@@ -14,25 +14,30 @@ from refine.energy.system import MRFSystem
 from refine.solvers.linear import LinearSolution, Problem, SolverError
 
 BAND_ENTRIES = 1 << 26
-"""Largest band that is stored, in numbers of 8 bytes: half a GiB, a square of 320 pixels or 500 x 250."""
+"""Largest banded matrix that is stored, in entries of 8 bytes: half a GiB, an image of 320x320 or 500x250 pixels."""
 
 Inverse = Callable[[Floats], Floats]
+"""b -> A^-1 b, both (H W)."""
 
 
 def solve_direct(problem: Problem, tolerance: float) -> LinearSolution:  # noqa: ARG001
-    """Solve by a factorisation; neither `problem.start` nor `tolerance` matters to it.
+    """Solve by a factorisation.
 
-    The exact form's matrix is symmetric, positive definite and, pixels counted along the shorter side, a band: LAPACK's
-    Cholesky takes a third of SuperLU's time on it while it is small. Anything else is SuperLU's.
+    The exact form's matrix is symmetric positive definite and, with pixels numbered along the shorter side, banded:
+    while it is small, LAPACK's banded Cholesky takes a third of SuperLU's time. Anything else goes to SuperLU.
+
+    Args:
+        problem: The refinement; its `start` does not matter.
+        tolerance: Does not matter; here because all solvers have it.
 
     Raises:
         SolverError: If the matrix is singular, that is if nothing determines the disparity of some region.
     """
     system = problem.system()
     height, width = problem.shape
-    inverse = _banded(system) or _sparse(system)
+    inverse = _banded_cholesky(system) or _sparse_lu(system)
     x = inverse(system.right_hand_side)
-    # One step of iterative refinement wins back the digits that large jumps between coefficients cost.
+    # One step of iterative refinement recovers the digits lost to large jumps between coefficients.
     x += inverse(system.right_hand_side - system.apply(x))
     if not np.isfinite(x).all():
         raise SolverError(
@@ -42,20 +47,21 @@ def solve_direct(problem: Problem, tolerance: float) -> LinearSolution:  # noqa:
     return LinearSolution(x.reshape(height, width), 0, system.relative_residual(x), converged=True)
 
 
-def _banded(system: MRFSystem) -> Inverse | None:
-    """Cholesky of the band; None where there is none, where it is too large, and where it is indefinite to rounding."""
+def _banded_cholesky(system: MRFSystem) -> Inverse | None:
+    """Factorise as a banded matrix; None for the paper's form, if the band is too large, and if the matrix is
+    indefinite to rounding."""
     height, width = system.shape
-    reach = 2 * min(height, width) + 2  # two pixels, diagonally, at either end of the 25-point stencil
+    bandwidth = 2 * min(height, width) + 2  # to the corner of the 25-point stencil
     count = height * width
-    if system.form != "exact" or (reach + 1) * count > BAND_ENTRIES:
+    if system.form != "exact" or (bandwidth + 1) * count > BAND_ENTRIES:
         return None
     pixels = np.arange(count).reshape(height, width)
     order = (pixels if width <= height else pixels.T).ravel()
-    place = np.argsort(order)
+    position = np.argsort(order)
     matrix = sp.coo_array(system.matrix())
-    rows, columns = place[matrix.row], place[matrix.col]
+    rows, columns = position[matrix.row], position[matrix.col]
     lower = rows >= columns
-    band = np.zeros((reach + 1, count), order="F")
+    band = np.zeros((bandwidth + 1, count), order="F")
     band[(rows - columns)[lower], columns[lower]] = matrix.data[lower]
     try:
         factor = cholesky_banded(band, overwrite_ab=True, lower=True, check_finite=False)
@@ -63,15 +69,15 @@ def _banded(system: MRFSystem) -> Inverse | None:
         return None
 
     def inverse(b: Floats) -> Floats:
-        x: Floats = cho_solve_banded((factor, True), b[order], check_finite=False)[place]
+        x: Floats = cho_solve_banded((factor, True), b[order], check_finite=False)[position]
         return x
 
     return inverse
 
 
-def _sparse(system: MRFSystem) -> Inverse:
-    """SuperLU of the matrix. Both forms are diagonally led and symmetric in structure: the ordering for A' + A and
-    pivots from the diagonal fill in far less than the defaults for general matrices."""
+def _sparse_lu(system: MRFSystem) -> Inverse:
+    """Factorise by SuperLU. Both forms have a heavy diagonal and a symmetric pattern: minimum degree ordering of
+    A' + A and pivots on the diagonal fill in far less than the defaults for general matrices."""
     try:
         factors = splu(
             sp.csc_matrix(system.matrix()),

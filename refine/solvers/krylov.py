@@ -1,4 +1,4 @@
-"""Conjugate gradients and BiCGSTAB over stencil operators: float32, with the solution kept and judged in float64."""
+"""Conjugate gradients and BiCGSTAB on stencil operators: float32 vectors, the solution summed and judged in float64."""
 
 from __future__ import annotations
 
@@ -10,38 +10,53 @@ import numpy as np
 from numba import njit, prange
 
 from refine.energy.affinity import Floats
+from refine.solvers.arrays import Float32Array
 from refine.solvers.linear import LinearSolution, Problem
-from refine.solvers.stencils import Singles, StencilOperator, System, crop
+from refine.solvers.stencil.operator import StencilOperator
+from refine.solvers.stencil.padding import crop
+from refine.solvers.stencil.right_hand_side import StencilSystem
 
-Preconditioner = Callable[[Singles, Singles], None]
-"""Of a residual, a correction into the second array; both padded."""
+Preconditioner = Callable[[Float32Array, Float32Array], None]
+"""(residual, out): writes M^-1 residual into `out`; both (H, W), padded."""
 
-_RENEWED = 1e-3
-"""Each time the residual has shrunk by this factor it is worked out anew from the solution: the one that the
-steps keep has then drifted by the rounding of far larger ones (van der Vorst and Ye 2000). Directions stay."""
+_REPLACEMENT = 1e-3
+"""Each time the residual has shrunk by this factor it is computed anew from the solution: the recurrence's residual has
+then drifted by the rounding of far larger ones (residual replacement: H. A. van der Vorst, Q. Ye, SIAM J. Sci. Comput.
+22 (3), 2000). Search directions are kept."""
 
 
 @dataclass(frozen=True)
-class Iterated:
-    """What was reached."""
+class KrylovResult:
+    """What the iterations reached."""
 
     x: Floats
-    """Padded."""
+    """(H, W), padded."""
     iterations: int
-    residual: float
+    residual_norm: float
     """|b - A x|."""
 
 
 def solve_iteratively(
-    problem: Problem, system: System, tolerance: float, precondition: Preconditioner, max_iterations: int
+    problem: Problem,
+    system: StencilSystem,
+    tolerance: float,
+    precondition: Preconditioner,
+    max_iterations: int,
 ) -> LinearSolution:
-    """The problem's solution from its start on, until |b - A x| <= tolerance |b|; overwrites the system's
-    residual."""
-    size = system.size or 1.0
-    reached = krylov(system.operator, system.residual, tolerance * size, precondition, max_iterations)
-    relative = reached.residual / size
-    x = crop(reached.x) + problem.start
-    return LinearSolution(x, reached.iterations, relative, relative <= tolerance)
+    """Solve a refinement from its start on, until |b - A x| <= tolerance |b|.
+
+    Args:
+        problem: The refinement.
+        system: Its system; `residual` is overwritten.
+        tolerance: Relative residual; an absolute one where b is 0.
+        precondition: The preconditioner.
+        max_iterations: After which it gives up, with `converged` False.
+    """
+    norm = system.right_hand_side_norm or 1.0
+    result = krylov(system.operator, system.residual, tolerance * norm, precondition, max_iterations)
+    relative = result.residual_norm / norm
+    x = crop(result.x) + problem.start
+    return LinearSolution(x, result.iterations, relative, relative <= tolerance)
 
 
 def krylov(
@@ -50,21 +65,26 @@ def krylov(
     target: float,
     precondition: Preconditioner,
     max_iterations: int,
-) -> Iterated:
-    """Conjugate gradients for a symmetric operator, BiCGSTAB for another, from 0 until |b - A x| <= target.
+) -> KrylovResult:
+    """Solve A x = b from 0 by CG where A is symmetric, by BiCGSTAB where not; an iteration of BiCGSTAB costs two of CG.
 
-    `b` is padded, and overwritten. A BiCGSTAB iteration costs about two of CG.
+    Args:
+        operator: A.
+        b: (H, W), padded; overwritten.
+        target: |b - A x| at which the iterations stop.
+        precondition: The preconditioner, symmetric where A is.
+        max_iterations: After which they stop in any case.
     """
     x = np.zeros(b.shape)
-    size = math.sqrt(_dot(b, b))
-    if not size > target:
-        return Iterated(x, 0, size)
-    b /= size  # so that tight tolerances do not sink below what float32 can hold
+    norm = math.sqrt(_dot(b, b))
+    if not norm > target:
+        return KrylovResult(x, 0, norm)
+    b /= norm  # so that tight tolerances do not sink below what float32 can hold
     method = _conjugate_gradients if operator.symmetric else _bicgstab
     with np.errstate(all="ignore"):  # a breakdown shows as a residual that is not finite
-        iterations, residual = method(operator, b, x, target / size, precondition, max_iterations)
-    x *= size
-    return Iterated(x, iterations, residual * size)
+        iterations, residual_norm = method(operator, b, x, target / norm, precondition, max_iterations)
+    x *= norm
+    return KrylovResult(x, iterations, residual_norm * norm)
 
 
 def _conjugate_gradients(
@@ -75,22 +95,25 @@ def _conjugate_gradients(
     precondition: Preconditioner,
     max_iterations: int,
 ) -> tuple[int, float]:
-    residual = b.astype(np.float32)
-    direction, product = np.zeros_like(residual), np.zeros_like(residual)
-    norm = renewed = before = 1.0
+    """Preconditioned CG (Y. Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., SIAM 2003, Algorithm 9.1), its
+    lines in the comments; the number of iterations and |b - A x|."""
+    r = b.astype(np.float32)
+    p, product = np.zeros_like(r), np.zeros_like(r)
+    norm = replaced = rz_before = 1.0
     for iteration in range(max_iterations):
-        if not norm > max(target, _RENEWED * renewed):
-            norm = renewed = math.sqrt(operator.remainder(b, x, residual))
+        if not norm > max(target, _REPLACEMENT * replaced):
+            norm = replaced = math.sqrt(operator.residual(b, x, r))
             if not norm > target:
                 return iteration, norm
-        correction = product  # the last product is done with
-        precondition(residual, correction)
-        energy = _dot(residual, correction)
-        _advance(direction, correction, energy / before if iteration else 0.0)
-        along, _ = operator.apply_against(direction, direction, product)
-        norm = math.sqrt(_step(x, residual, direction, product, np.float32(energy / along)))
-        before = energy
-    return max_iterations, math.sqrt(operator.remainder(b, x, residual))
+        z = product  # A p is no longer needed
+        precondition(r, z)  # 6: z = M^-1 r
+        rz = _dot(r, z)
+        _update_direction(p, z, rz / rz_before if iteration else 0.0)  # 7, 8: p = z + beta p
+        p_ap, _ = operator.apply_and_dot(p, p, product)
+        alpha = rz / p_ap  # 3
+        norm = math.sqrt(_step(x, r, p, product, np.float32(alpha)))  # 4, 5: x += alpha p, r -= alpha A p
+        rz_before = rz
+    return max_iterations, math.sqrt(operator.residual(b, x, r))
 
 
 def _bicgstab(
@@ -101,35 +124,44 @@ def _bicgstab(
     precondition: Preconditioner,
     max_iterations: int,
 ) -> tuple[int, float]:
-    """van der Vorst 1992, preconditioned from the right; the shadow residual is b."""
-    residual = b.astype(np.float32)
-    direction, product = np.zeros_like(residual), np.zeros_like(residual)
-    half, second = np.zeros_like(residual), np.zeros_like(residual)
-    norm = renewed = rho = alpha = omega = 1.0
+    """BiCGSTAB, preconditioned from the right (H. A. van der Vorst, SIAM J. Sci. Stat. Comput. 13 (2), 1992; R. Barrett
+    et al., Templates for the Solution of Linear Systems, SIAM 1994, Fig. 2.10); the number of iterations and
+    |b - A x|.
+
+    The shadow residual r~ is b.
+    """
+    r = b.astype(np.float32)
+    p, v = np.zeros_like(r), np.zeros_like(r)
+    preconditioned, t = np.zeros_like(r), np.zeros_like(r)
+    norm = replaced = rho = alpha = omega = 1.0
     for iteration in range(max_iterations):
-        if not norm > max(target, _RENEWED * renewed):
-            norm = renewed = math.sqrt(operator.remainder(b, x, residual))
+        if not norm > max(target, _REPLACEMENT * replaced):
+            norm = replaced = math.sqrt(operator.residual(b, x, r))
             if not norm > target:
                 return iteration, norm
-        before, rho = rho, _dot(b, residual)
-        _redirect(direction, residual, product, (rho / before) * (alpha / omega), omega)
-        precondition(direction, half)
-        shadow, _ = operator.apply_against(half, b, product)
-        alpha = rho / shadow
-        norm = math.sqrt(_step(x, residual, half, product, np.float32(alpha)))
+        rho_before, rho = rho, _dot(b, r)
+        beta = (rho / rho_before) * (alpha / omega)
+        _update_bicgstab_direction(p, r, v, beta, omega)  # p = r + beta (p - omega v)
+        precondition(p, preconditioned)
+        shadow_v, _ = operator.apply_and_dot(preconditioned, b, v)  # v = A M^-1 p
+        alpha = rho / shadow_v
+        # s = r - alpha v, kept in r; x += alpha M^-1 p
+        norm = math.sqrt(_step(x, r, preconditioned, v, np.float32(alpha)))
         if not norm > target:
-            norm = renewed = math.sqrt(operator.remainder(b, x, residual))
+            norm = replaced = math.sqrt(operator.residual(b, x, r))
             if not norm > target:
                 return iteration + 1, norm
-        precondition(residual, half)
-        along, size = operator.apply_against(half, residual, second)
-        omega = along / size
-        norm = math.sqrt(_step(x, residual, half, second, np.float32(omega)))
-    return max_iterations, math.sqrt(operator.remainder(b, x, residual))
+        precondition(r, preconditioned)
+        ts, tt = operator.apply_and_dot(preconditioned, r, t)  # t = A M^-1 s
+        omega = ts / tt
+        # r = s - omega t; x += omega M^-1 s
+        norm = math.sqrt(_step(x, r, preconditioned, t, np.float32(omega)))
+    return max_iterations, math.sqrt(operator.residual(b, x, r))
 
 
 @njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
 def _dot(a, b):
+    """In float64."""
     total = 0.0
     for y in prange(a.shape[0]):
         row = 0.0
@@ -140,17 +172,18 @@ def _dot(a, b):
 
 
 @njit(cache=True, parallel=True)
-def _advance(direction, correction, momentum):
-    factor = np.float32(momentum)
+def _update_direction(direction, correction, beta):
+    """direction = correction + beta direction."""
+    factor = np.float32(beta)
     for y in prange(direction.shape[0]):
         for x in range(direction.shape[1]):
             direction[y, x] = correction[y, x] + factor * direction[y, x]
 
 
 @njit(cache=True, parallel=True)
-def _redirect(direction, residual, product, momentum, omega):
-    """direction = residual + momentum (direction - omega product)."""
-    factor, along = np.float32(momentum), np.float32(omega)
+def _update_bicgstab_direction(direction, residual, product, beta, omega):
+    """direction = residual + beta (direction - omega product)."""
+    factor, along = np.float32(beta), np.float32(omega)
     for y in prange(direction.shape[0]):
         for x in range(direction.shape[1]):
             direction[y, x] = residual[y, x] + factor * (direction[y, x] - along * product[y, x])
@@ -158,7 +191,7 @@ def _redirect(direction, residual, product, momentum, omega):
 
 @njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
 def _step(x, residual, direction, product, step):
-    """One step along `direction`; the squared norm of the new residual."""
+    """x += step direction, residual -= step product; the squared norm of the new residual."""
     total = 0.0
     for y in prange(x.shape[0]):
         row = 0.0

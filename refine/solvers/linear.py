@@ -10,35 +10,40 @@ from numpy.typing import NDArray
 from refine.energy.affinity import Floats
 from refine.energy.parameters import MRFParameters
 from refine.energy.system import Form, MRFSystem, build_system
+from stereoforge_kit.errors import UserError
 
 
-class SolverError(RuntimeError):
-    """The linear system could not be solved."""
+class SolverError(UserError):
+    """The linear system could not be solved: its matrix is singular, or the iterations stopped short."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One refinement, checked; shapes as for `refine.refine_disparity`, disparity and confidence without
-    NaN."""
+    """The checked inputs of one refinement, shaped as for `refine.refine_disparity`."""
 
     disparity: Floats
+    """(H, W) initial disparity in pixels, without NaN."""
     confidence: Floats
+    """(H, W) in [0, 1], without NaN."""
     gradient: Floats
+    """(H, W, 2) predicted gradient [dx, dy] in pixels a pixel; NaN where there is none."""
     image: NDArray[np.uint8]
+    """(H, W, 3)."""
     parameters: MRFParameters
     form: Form
     start: Floats
-    """(H, W) where the iterations begin."""
+    """(H, W) initial guess of the iterations, in pixels."""
     gradient_factor: Floats | None = None
     """(H, W, 2) factors of the gradient terms' weights alpha phi, not negative; 1 if None."""
 
     @property
     def shape(self) -> tuple[int, int]:
+        """(H, W)."""
         height, width = self.disparity.shape
         return height, width
 
     def system(self) -> MRFSystem:
-        """The problem as sparse matrices in float64."""
+        """A and b as sparse matrices in float64."""
         return build_system(
             self.disparity,
             self.confidence,
@@ -55,9 +60,10 @@ class LinearSolution:
     """An approximate solution of A x = b in float64, and how it was reached."""
 
     x: Floats
-    """(H, W)."""
+    """(H, W), in pixels."""
     iterations: int
     """Of the Krylov method; 0 for a direct solver."""
     relative_residual: float
     """|b - A x| / |b|, or |A x| where b is 0."""
     converged: bool
+    """Whether the relative residual is within the tolerance."""

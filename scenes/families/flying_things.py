@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from scenes.appearance.lights import sample_area_light, sample_sun
 from scenes.appearance.materials import sample_material
-from scenes.family import Family, FamilyConfig
+from scenes.family import Family, FamilyConfig, crowd_share
 from scenes.motion.trajectories import exposure_times, quaternion, shifted, vector, wander
 from scenes.random_draws import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.shapes import SHAPES
@@ -115,9 +115,9 @@ class FlyingThingsConfig(FamilyConfig):
         return replace(self, complexity=complexity * self.complexity)
 
     def count(self, rng: np.random.Generator, limits: Count) -> int:
-        """Draw how many there are of something: at complexity 0 a tenth, but at least one of any."""
+        """Draw how many there are of something: fewer at a low complexity (`crowd_share`), but at least one of any."""
         drawn = integer(rng, *limits)
-        return max(min(drawn, 1), round(drawn * (0.1 + 0.9 * self.complexity)))
+        return max(min(drawn, 1), round(drawn * crowd_share(self.complexity)))
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -23,11 +23,12 @@ class Demo:
     """Folder for everything."""
 
     def run(self) -> None:
+        """Run every stage and print the main numbers and where the report is."""
         from stereoforge.pipelines.demo import run_demo, summary_table
 
         result = run_demo(self.out)
         console.print(summary_table(result.evaluation, "networks trained just now"))
-        console.print(summary_table(result.shipped, "networks that come with StereoForge, same frames"))
+        console.print(summary_table(result.bundled, "bundled weights, same frames"))
         console.print(
             f"Made in {result.minutes:.1f} minutes: a toy by its training, the real thing in every step.\n"
             f"  pictures of the data set   {result.gallery}\n"

@@ -28,7 +28,7 @@ class Evaluate:
     """Data sets: folders or URLs, with FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
     out: Annotated[Path, shown("REPORT")]
     """Folder for the report."""
-    weights: Annotated[Path, shown("RUN", "the shipped networks")] = BUNDLED_WEIGHTS
+    weights: Annotated[Path, shown("RUN", "the bundled weights")] = BUNDLED_WEIGHTS
     """Run folder of the networks."""
     split: Literal["train", "val", "test"] = "test"
     """Which split of the data sets; those without splits are taken whole."""
@@ -53,6 +53,7 @@ class Evaluate:
     """What the networks run on: cpu, cuda, ..."""
 
     def run(self) -> None:
+        """Predict, refine and score every frame, then write the report."""
         methods = parse_methods(self.methods)
         if not self.data:
             raise UsageError("evaluate needs at least one data set")

@@ -35,6 +35,7 @@ class Export:
     """kitti: keep only the disparities that a laser scanner with so many beams would measure (KITTI's has 64)."""
 
     def run(self) -> None:
+        """Write the data set in the other layout, showing progress."""
         if self.frames_per_shard < 1:
             raise UsageError(f"--frames-per-shard must be at least 1, got {self.frames_per_shard}")
         if self.lidar_beams is not None and self.lidar_beams < 1:

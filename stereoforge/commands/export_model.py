@@ -26,6 +26,7 @@ class ExportModel:
     """Folder for stereoforge.onnx and the model card."""
 
     def run(self) -> None:
+        """Write the ONNX file and compare its results with torch's."""
         from training.prediction.onnx_export import export_model
         from training.runs.model_card import write_model_card
 

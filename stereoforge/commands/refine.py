@@ -25,9 +25,9 @@ POSTERIOR_SAMPLES = 32
 
 
 FEW_KNOWN = 0.1
-"""A disparity from elsewhere that is known at a smaller share of the pixels is taken for a mistake."""
+"""A disparity from another predictor that is known at a smaller share of the pixels is taken for a mistake."""
 LOW_CONFIDENCE = 0.15
-"""A mean confidence below this, too: the shipped networks have 0.4 on photographs, 0.1 on two that do not belong
+"""A mean confidence below this, too: the bundled weights give 0.4 on photographs, 0.1 on two that do not belong
 together."""
 BEYOND_INFINITY_PX = -0.5
 BEYOND_INFINITY = 0.01
@@ -38,7 +38,7 @@ BEYOND_INFINITY = 0.01
 class Refine:
     """Predict disparity, confidence and gradients of a rectified pair, and refine the disparity with the MRF.
 
-    With --disparity or --predictor sgbm the disparity comes from elsewhere; the run folder's confnet_free and
+    With --disparity or --predictor sgbm the disparity comes from another predictor; the run folder's confnet_free and
     gradnet_free judge it, or, without them, consistency and texture. Writes disparity.pfm, disparity_initial.pfm,
     confidence.pfm, gradient.exr and overview.png.
     """
@@ -49,8 +49,8 @@ class Refine:
     """Right picture, rectified and of the same size."""
     out: Annotated[Path, shown("DIR")]
     """Folder for the results."""
-    weights: Annotated[Path, shown("RUN", "the shipped networks")] = BUNDLED_WEIGHTS
-    """Run folder with a regressor, a confnet and a gradnet; for a disparity from elsewhere, with a confnet_free and a
+    weights: Annotated[Path, shown("RUN", "the bundled weights")] = BUNDLED_WEIGHTS
+    """Run folder with a regressor, a confnet and a gradnet; for another predictor's disparity, a confnet_free and a
     gradnet_free."""
     disparity: Annotated[Path | None, shown("FILE", "none")] = None
     """Disparity of the left view in pixels to refine instead of predicting one: PFM (NaN, infinite or negative where
@@ -71,6 +71,7 @@ class Refine:
     """What the networks run on: cpu, cuda, ..."""
 
     def run(self) -> None:
+        """Refine the pair and write every output into the folder."""
         self._check()
         left, right = read_color_image(self.left), read_color_image(self.right)
         from stereoforge.inputs.disparity_files import read_disparity
@@ -81,8 +82,8 @@ class Refine:
             size = (left.shape[0], left.shape[1])
             other = None if self.disparity_right is None else read_disparity(self.disparity_right, size)
             given = read_disparity(self.disparity, size), other
-        elsewhere: Literal["networks", "sgbm"] = "sgbm" if given is not None else self.predictor
-        settings = open_settings(self.parameters, self.weights, elsewhere)
+        predictor: Literal["networks", "sgbm"] = "sgbm" if given is not None else self.predictor
+        settings = open_settings(self.parameters, self.weights, predictor)
         method = settings.ours
         if self.form is not None:
             method = replace(settings.ours_quadratic, form=self.form)
@@ -154,7 +155,7 @@ def _doubts(given: NDArray[np.float32] | None, confidence: NDArray[np.float32]) 
     if confidence.mean() < LOW_CONFIDENCE:
         doubts.append(
             f"the confidence is low nearly everywhere (mean {confidence.mean():.2f}): are the views rectified, the "
-            "left one first, and a disparity from elsewhere in pixels?"
+            "left one first, and the disparity in pixels?"
         )
     return doubts
 

@@ -98,6 +98,7 @@ class Render:
     scene; nothing is written."""
 
     def run(self) -> None:
+        """Render what is missing, showing progress; exit code 1 if a scene failed."""
         parse_shard(self.shard)
         if not self.out:
             raise UsageError("--out needs a folder or a URL")

@@ -56,6 +56,7 @@ class Study:
     """What the networks run on: cpu, cuda, ..."""
 
     def run(self) -> None:
+        """Run every step that is not done yet, then write the results."""
         plan = self._plan()
         from stereoforge.study import run_study
 

@@ -53,14 +53,14 @@ class Train:
     crop: Annotated[str | None, shown("WxH", "the preset's")] = None
     """Size of the training crops, multiples of 64; KITTI's frames need 320 rows or fewer."""
     correct_within: Annotated[float | None, shown("PX", "the preset's, 1")] = None
-    """confnet: a disparity this close to the truth counts as correct (KITTI: 3)."""
+    """confnet: a disparity this close to the ground truth counts as correct (KITTI: 3)."""
     ema: Annotated[float | None, shown("DECAY", "none")] = None
     """Validate and keep a moving average of the weights, for example 0.999."""
     curriculum: Annotated[float, shown("SHARE")] = 0.0
     """Share of the run over which the crops come from a growing first part of every data set, for those rendered from
     simple to complex (render --curriculum)."""
     pseudo: Annotated[Path | None, shown("DIR", "none")] = None
-    """Folder of disparities to train on instead of the data set's own truth: <frame name>.pfm or KITTI-like .png."""
+    """Folder of disparities to train on instead of the data set's ground truth: <frame name>.pfm or KITTI-like .png."""
     init: Annotated[Path | None, shown("RUN", "none")] = None
     """Run folder of the regressor to start from or to build on; for joint, of all three networks and, where they are
     validated, of the refinement's parameters, which are copied too."""
@@ -85,6 +85,7 @@ class Train:
         return "the same command with --resume continues from the last checkpoint"
 
     def run(self) -> None:
+        """Train the network, or continue with --resume."""
         for name, value, least in (
             ("steps", self.steps, 1),
             ("seed", self.seed, 0),

@@ -42,6 +42,7 @@ class Tune:
     """What the networks run on: cpu, cuda, ..."""
 
     def run(self) -> None:
+        """Search the parameters and write them into the run folder."""
         if self.frames < 1:
             raise UsageError(f"--frames must be at least 1, got {self.frames}")
         if not self.data:
@@ -50,7 +51,7 @@ class Tune:
         from rich.table import Table
 
         from datagen.sources.registry import open_source
-        from refine.methods.registry import default_methods
+        from refine.registry import default_methods
         from stereoforge.pipelines.parameter_search import Tuning, describe, shown_values, validation_frames
         from stereoforge.pipelines.prediction import (
             network_digests,

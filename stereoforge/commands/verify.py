@@ -36,6 +36,7 @@ class Verify:
     """Random pixels of each view to compare with the scene's geometry; 0 leaves that out, which is most of the time."""
 
     def run(self) -> None:
+        """Check the data set and print what is wrong, or repair it."""
         if self.workers is not None and self.workers < 1:
             raise UsageError(f"--workers must be at least 1, got {self.workers}")
         if self.geometry_pixels < 0:
@@ -46,11 +47,11 @@ class Verify:
         if self.repair and broken:
             console.print(f"{report}; rendering {len(broken)} scenes again")
             self._repair(broken)
-            elsewhere = len(problems_left(report.problems, broken))
+            unfinished = len(problems_left(report.problems, broken))
             report = self._verify(broken)
             _print_problems(report)
-            if elsewhere:
-                raise CommandError(f"{report}; {elsewhere} problems are in no finished scene and are left")
+            if unfinished:
+                raise CommandError(f"{report}; {unfinished} problems are in no finished scene and are left")
         if not report.ok:
             raise CommandError(str(report))
         console.print(str(report))

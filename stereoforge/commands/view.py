@@ -30,6 +30,7 @@ class View:
     """Another data set, to put its statistics beside this one's."""
 
     def run(self) -> None:
+        """Write the page."""
         if self.scenes < 1:
             raise UsageError(f"--scenes must be at least 1, got {self.scenes}")
         if self.out.is_dir():

@@ -1,4 +1,4 @@
-"""Reading somebody else's disparity."""
+"""Read the disparity of another predictor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reading the small languages of flag values."""
+"""Parse the values of flags."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def parse_counts(flag: str, text: str, names: tuple[str, ...]) -> dict[str, int]
 
 def parse_methods(text: str) -> tuple[str, ...]:
     """Names of methods out of "ours,wmf"; empty for all there are."""
-    from refine.methods.registry import default_methods
+    from refine.registry import default_methods
 
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     try:

@@ -1,4 +1,4 @@
-"""Reading a user's own picture."""
+"""Read a picture that the user names."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ from training.runs.train import train
 NETWORKS = ("regressor", "confnet", "gradnet", "regressor_f")
 TOO_FEW = " They are too few for error bars."
 SHIPPED_METHODS = ("regressor", "gradnet", "ours", "ours_conf_gt")
-"""What is run with the shipped networks, to show what more training brings."""
+"""What is run with the bundled weights, to show what more training brings."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class DemoResult:
     report: Path
     evaluation: Evaluation
     """Of the networks trained here."""
-    shipped: Evaluation
+    bundled: Evaluation
     """Of the networks that come with StereoForge, on the same frames."""
     minutes: float
 
@@ -86,28 +86,28 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
         with clock.stage(f"training the {network}, {plan.steps[network]} steps"):
             train(network, [(data, 1.0)], weights, "tiny", steps=plan.steps[network], resume=True)
     (test,) = open_test_data([str(data)], "test")
-    # There is no time to choose parameters here; the shipped ones were chosen on a validation set of such worlds.
+    # There is no time to choose parameters here; the bundled ones were chosen on a validation set of such worlds.
     settings = open_settings(None, BUNDLED_WEIGHTS)
     with clock.stage(f"refining and evaluating {len(test.frames)} test pairs"):
         evaluated = evaluate_set(test, open_predictors(weights), settings.rows())
     with clock.stage("the same with the networks that come with StereoForge"):
-        shipped = _evaluate_shipped(test, settings)
+        bundled = _evaluate_bundled(test, settings)
     minutes = clock.seconds / 60
     files = report_evaluation(
-        [evaluated, shipped],
+        [evaluated, bundled],
         weights,
         out / "report",
         limits=_limits(plan, minutes),
         title="StereoForge demo",
         facts={"Parameters": describe_settings(settings)},
     )
-    return DemoResult(data, weights, gallery, files.html, evaluated.evaluation, shipped.evaluation, minutes)
+    return DemoResult(data, weights, gallery, files.html, evaluated.evaluation, bundled.evaluation, minutes)
 
 
-def _evaluate_shipped(test: TestData, settings: Settings) -> EvaluatedSet:
-    """The shipped networks on the demo's test frames."""
-    facts = {**test.facts, "Networks": "shipped: " + "; ".join(describe_networks(BUNDLED_WEIGHTS))}
-    named = replace(test, name=f"{test.name}, shipped networks", facts=facts)
+def _evaluate_bundled(test: TestData, settings: Settings) -> EvaluatedSet:
+    """The bundled weights on the demo's test frames."""
+    facts = {**test.facts, "Networks": "bundled: " + "; ".join(describe_networks(BUNDLED_WEIGHTS))}
+    named = replace(test, name=f"{test.name}, bundled weights", facts=facts)
     return evaluate_set(named, open_predictors(BUNDLED_WEIGHTS), settings.rows(SHIPPED_METHODS))
 
 

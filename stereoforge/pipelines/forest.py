@@ -1,4 +1,4 @@
-"""Training the random-forest confidence on the disparity of a run folder's regressor."""
+"""Train the random-forest confidence on the disparity of a run folder's regressor."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def train_forest(
     predictor = StereoPredictor(out, device)
     with progress_bar() as progress:
         frames = progress.track(chosen, description="predicting for the forest")
-        seen = (_forest_frame(samples[i], predictor) for i in frames)
-        forest = grow_forest(seen, len(chosen), plan.config, seed)
+        training_frames = (_forest_frame(samples[i], predictor) for i in frames)
+        forest = grow_forest(training_frames, len(chosen), plan.config, seed)
     save_forest(file, forest, {"data": list(data), "frames": len(chosen), "seed": seed})
     return forest
 

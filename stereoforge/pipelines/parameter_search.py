@@ -1,4 +1,4 @@
-"""Validating parameters: predict the validation split once, then search each method's parameters on it."""
+"""Parameter search: predict the validation split once, then tune each method on it."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from refine.evaluation.tuning import (
     usual_trials,
     value_at,
 )
-from refine.methods.base import Method
-from refine.methods.registry import known_methods, table_order
+from refine.method import Method
+from refine.registry import known_methods, table_order
 from stereoforge.errors import CommandError
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.progress import console, progress_bar
@@ -36,7 +36,7 @@ VALIDATION = "val"
 
 @dataclass
 class Tuning:
-    """A search under way: every trial is on disk before the next begins."""
+    """A running search. Every trial is on disk before the next one begins."""
 
     frames: Sequence[EvaluationFrame]
     out: Path
@@ -128,10 +128,10 @@ def describe(
     objective: Objective,
     networks: Mapping[str, str],
 ) -> dict[str, Any]:
-    """What is written of a search's circumstances; the fingerprint tells whether two searches are the same.
+    """The circumstances of a search, as written to disk; the fingerprint tells whether two searches are the same.
 
-    It is of the pictures, the truth and the networks (`prediction.network_digests`), not of what the networks predict,
-    which another number of threads rounds differently.
+    It covers the pictures, the ground truth and the networks (`prediction.network_digests`), not the predictions, which
+    another number of threads rounds differently.
     """
     digest = hashlib.sha256(json.dumps([objective, dict(networks)], sort_keys=True).encode())
     for frame in frames:

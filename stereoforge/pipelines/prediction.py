@@ -1,4 +1,4 @@
-"""From a pair of pictures to what the refinement and the evaluation take in."""
+"""Predictions for a pair: the inputs of refinement and evaluation."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen import StereoSample
 from datagen.sources.stereo_frame import StereoFrame
 from refine.evaluation.evaluate import EvaluationFrame
 from refine.evaluation.settings import Settings, read_settings
 from refine.forest import Forest, load_forest
-from refine.heuristic_inputs import consistency_confidence, local_slopes
-from refine.methods.base import Method
+from refine.heuristic_inputs import consistency_confidence, local_gradients
+from refine.method import Method
 from stereoforge.errors import CommandError
 from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
 from training.prediction.predictor import FreePredictor, Prediction, StereoPredictor
@@ -32,26 +31,27 @@ Map = NDArray[np.float32]
 
 
 class PairPredictor(Protocol):
-    """Anything that gives a disparity for a pair, and what else it knows."""
+    """A predictor of a disparity for a pair, and of confidence and gradients where it knows them."""
 
     def predict(self, left: Image, right: Image) -> Prediction: ...
 
 
 @dataclass(frozen=True)
 class MatchingPredictor:
-    """Semi-global matching, or a given disparity, with the networks that need no regressor, or without them."""
+    """Semi-global matching, or a given disparity, judged by the regressor-free networks or by heuristics."""
 
     networks: FreePredictor
     matcher: SGBMParameters
 
     def predict(self, left: Image, right: Image) -> Prediction:
-        """Match the pair, and judge the match."""
+        """Match the pair; return disparity, confidence and gradients."""
         return self.judge(left, right, *match_both(left, right, self.matcher))
 
     def predict_for(
         self, left: Image, right: Image, disparity: Map, disparity_right: Map | None
     ) -> Prediction:
-        """Judge a given disparity (H, W), NaN in holes; the right view's is matched where it is not given."""
+        """Predict confidence and gradients of a given disparity (H, W), NaN in holes. The right view's disparity is
+        matched where it is not given."""
         if disparity_right is None:
             reach = max(self.matcher.max_disparity_px, math.ceil(float(np.nanmax(disparity))) + 16)
             matcher = replace(self.matcher, max_disparity_px=min(reach, left.shape[1]))
@@ -59,20 +59,22 @@ class MatchingPredictor:
         return self.judge(left, right, disparity, disparity_right)
 
     def judge(self, left: Image, right: Image, disparity: Map, disparity_right: Map) -> Prediction:
-        """Confidence and gradients by the networks there are, else by hand; holes are filled from the background."""
+        """Confidence and gradients by the networks, or by heuristics where there are none.
+
+        Holes are filled from the background."""
         judged = self.networks.predict(left, right, disparity, disparity_right)
         confidence, gradient = judged.confidence, judged.gradient
         if confidence is None:
             consistency = left_right_consistency(disparity, disparity_right)
             confidence = consistency_confidence(disparity, consistency, left)
         if gradient is None:
-            gradient = local_slopes(disparity, confidence, left)
+            gradient = local_gradients(disparity, confidence, left)
         return Prediction(fill_background(disparity), confidence, gradient)
 
 
 @dataclass(frozen=True)
 class Predictors:
-    """Everything that says something about a pair."""
+    """All predictors of a run folder."""
 
     initial: PairPredictor
     """Gives the disparity that is refined."""
@@ -84,31 +86,30 @@ class Predictors:
     def frame(self, sample: StereoFrame) -> EvaluationFrame:
         """One sample with all that is predicted for it, and how long that took.
 
-        Where nobody knows what is occluded, nothing is taken to be. Object maps are KITTI's, cars told from the
-        rest; those of our own sets number everything. Frames of one folder are of one scene.
+        Where nobody knows what is occluded, nothing is taken to be.
         """
         occlusion = sample.occlusion_left
-        objects = None if isinstance(sample, StereoSample) else sample.object_index_left
+        left, right = sample.left, sample.right  # Read here: decoding and hashing are not the networks' time.
         began = time.perf_counter()
-        prediction = self.initial.predict(sample.left, sample.right)
+        prediction = self.initial.predict(left, right)
         seconds = {"disparity": time.perf_counter() - began}
         fine_tuned = None
         if self.fine_tuned is not None:
             began = time.perf_counter()
-            fine_tuned = self.fine_tuned.predict(sample.left, sample.right).disparity
+            fine_tuned = self.fine_tuned.predict(left, right).disparity
             seconds["fine_tuned"] = time.perf_counter() - began
         return EvaluationFrame(
             name=sample.name,
-            image=sample.left,
+            image=left,
             truth=sample.disparity_left,
             occlusion=np.zeros(sample.size, np.uint8) if occlusion is None else occlusion,
             disparity=prediction.disparity,
             confidence=prediction.confidence,
             gradient=prediction.gradient,
-            right=sample.right,
+            right=right,
             fine_tuned=fine_tuned,
-            objects=objects,
-            scene=sample.name.rpartition("/")[0],
+            objects=sample.foreground_left,
+            scene=sample.scene_name,
             other_confidences={}
             if self.forest is None
             else {"rdf": self._forest_confidence(sample, prediction)},
@@ -125,7 +126,7 @@ class Predictors:
 
 
 def open_predictors(run: Path, device: str = "cpu", predictor: PredictorName = "networks") -> Predictors:
-    """What a run folder holds; raises TrainingError, naming what is wrong."""
+    """Open the networks of a run folder. Raises TrainingError, naming what is wrong."""
     if predictor == "sgbm":
         return Predictors(open_matching(run, device), None)
     return Predictors(
@@ -157,12 +158,12 @@ def forest_file(run: Path) -> Path:
 
 
 def open_matching(run: Path, device: str = "cpu", matcher: SGBMParameters | None = None) -> MatchingPredictor:
-    """Semi-global matching with those networks of a run folder that need no regressor."""
+    """Semi-global matching with the regressor-free networks of a run folder."""
     return MatchingPredictor(FreePredictor(run, device), matcher or SGBMParameters())
 
 
 def fallback_notes(run: Path) -> list[str]:
-    """A sentence for each network that a foreign disparity has to do without."""
+    """A sentence for each network that the run folder lacks for a disparity from another predictor."""
     notes = []
     for task, instead in (
         ("confnet_free", "confidence is taken from left-right consistency and texture"),
@@ -174,14 +175,14 @@ def fallback_notes(run: Path) -> list[str]:
 
 
 def train_command(network: str, run: Path) -> str:
-    """What to type to have a network in a run folder."""
+    """The command that trains a network into a run folder."""
     return f"stereoforge train {network} --data DATA --out {run}"
 
 
 def untrained(methods: Sequence[Method], run: Path, predictor: PredictorName) -> dict[str, list[str]]:
     """Methods by name that a run folder does not serve, and the networks it lacks for each.
 
-    Judging semi-global matching needs none: what no network says is made by hand. It has no fine-tuned counterpart.
+    Semi-global matching needs none: heuristics stand in for missing networks. It has no fine-tuned counterpart.
     """
     networks = {"fine_tuned": "regressor_f"}
     if predictor == "networks":
@@ -221,7 +222,7 @@ def predict_pair(
     device: str,
     predictor: PredictorName,
 ) -> tuple[Prediction, list[str]]:
-    """All that refining one pair takes, and sentences on what had to be done without.
+    """The inputs of refining one pair, and a sentence for each input that had to be replaced.
 
     Args:
         given: The left view's disparity and perhaps the right view's, instead of a predictor.

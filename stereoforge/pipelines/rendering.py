@@ -1,4 +1,4 @@
-"""Rendering as a step of something larger: with progress, and whole or refused."""
+"""Rendering as a step of a pipeline: with progress, complete or refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joining data sets, networks and the MRF into evaluations and their report."""
+"""Evaluate networks and methods on data sets, and report it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from datagen import StereoSample
 from datagen.dataset.manifest import read_manifest
 from datagen.sources.registry import open_source
 from datagen.sources.stereo_frame import StereoFrame
-from refine.evaluation.evaluate import EvaluationOptions, evaluate
+from datagen.sources.webdataset import ShardFrames
+from refine.evaluation.evaluate import EvaluationFrame, EvaluationOptions, evaluate
 from refine.evaluation.results import EvaluatedSet
 from refine.evaluation.settings import Settings
-from refine.methods.base import Method
+from refine.method import Method
 from refine.report.write import ReportContext, ReportFiles, write_report
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.progress import progress_bar
@@ -26,7 +27,7 @@ KITTI_BAD_PX = 3.0
 
 @dataclass(frozen=True)
 class TestData:
-    """Frames to evaluate on, with what a reader wants to know of them."""
+    """Frames to evaluate on, with the facts that the report shows of them."""
 
     name: str
     frames: Sequence[StereoFrame]
@@ -56,7 +57,10 @@ def open_test_data(sources: Sequence[str], split: str) -> list[TestData]:
 
 
 def family_of(source: str, frames: Sequence[StereoFrame]) -> str:
-    """The family that rendered a set of ours, by its first scene's manifest; else the format's name."""
+    """The family that rendered a set of ours, as the first scene's manifest or the first sample of shards says; else
+    the format's name. Raises DatasetError."""
+    if isinstance(frames, ShardFrames) and frames.family is not None:
+        return frames.family
     first = frames[0]
     if isinstance(first, StereoSample):
         return read_manifest(first.layout.manifest(first.split, first.scene)).family
@@ -84,12 +88,21 @@ def evaluate_set(
         what = f"evaluating on {data.name}"
         task = progress.add_task(f"{what} (compiling, after an install)", total=len(data.frames))
         evaluation = evaluate(
-            (predictors.frame(frame) for frame in data.frames),
+            _predicted(data.frames, predictors),
             methods,
             options or evaluation_options(data.family),
             progress=lambda done, _: progress.update(task, completed=done, description=what),
         )
     return EvaluatedSet(data.name, evaluation, data.family, data.split, data.facts)
+
+
+def _predicted(frames: Sequence[StereoFrame], predictors: Predictors) -> Iterator[EvaluationFrame]:
+    """Every frame with its predictions. The first one's are made twice: what a first run compiles and allocates is not
+    the predictors' time."""
+    for order, frame in enumerate(frames):
+        if order == 0:
+            predictors.frame(frame)
+        yield predictors.frame(frame)
 
 
 def report_evaluation(

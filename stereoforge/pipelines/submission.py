@@ -14,7 +14,7 @@ from datagen.formats import write_png
 from datagen.formats.picture import read_picture
 from datagen.sources.registry import DataSource, open_source
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
-from refine.methods.base import Method
+from refine.method import Method
 from stereoforge.errors import UsageError
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.progress import progress_bar
@@ -25,7 +25,7 @@ FOLDER = "disp_0"
 
 
 def find_submission_frames(sources: Sequence[str]) -> list[StereoFrame]:
-    """The frames to be submitted of the one KITTI set among the sources: its testing part, whose truth only the
+    """The frames to be submitted of the one KITTI set among the sources: its testing part, whose ground truth only the
     server has, or, where that is not there, its training part.
 
     Raises UsageError if there is not exactly one such set.
@@ -70,4 +70,10 @@ def _frame(left: Path, right: Path) -> StereoFrame:
     def unknown() -> NDArray[np.float32]:
         return np.full(read_picture(left).shape[:2], np.nan, np.float32)
 
-    return FileFrame(left.stem, partial(read_picture, left), partial(read_picture, right), unknown)
+    return FileFrame(
+        name=left.stem,
+        scene_name=left.stem,
+        read_left=partial(read_picture, left),
+        read_right=partial(read_picture, right),
+        read_disparity_left=unknown,
+    )

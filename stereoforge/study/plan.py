@@ -11,7 +11,7 @@ import yaml
 
 from datagen import Recipe
 from datagen.recipe.recipe import recipe_from_plain
-from refine.methods.registry import default_methods
+from refine.registry import default_methods
 from scenes import FAMILIES
 from stereoforge.errors import UsageError
 from stereoforge.pipelines.forest import PLANS

@@ -18,7 +18,7 @@ from datagen.errors import DatasetError
 from datagen.sources.registry import open_source
 from refine.evaluation.archive import read_evaluation, write_evaluation
 from refine.evaluation.evaluate import EvaluationOptions
-from refine.methods.registry import table_order
+from refine.registry import table_order
 from scenes.serialization import to_plain
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.pipelines.forest import PLANS, train_forest

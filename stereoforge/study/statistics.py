@@ -36,7 +36,7 @@ class DomainStatistics:
     discontinuities: float
     """Share of pixels with a jump to a neighbour."""
     occluded: float
-    """Share of pixels that another surface hides from the right eye."""
+    """Share of pixels that are occluded in the right view."""
     out_of_frame: float
     """Share of pixels outside the right image."""
     textured: float

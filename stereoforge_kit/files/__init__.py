@@ -1,4 +1,4 @@
-"""Where files go: written whole or not at all, into a folder or below a URL; temporary ones; and who may write."""
+"""Files that are written whole or not at all, in a folder or below a URL; temporary folders; locks."""
 
 from stereoforge_kit.files.atomic import TEMPORARY_SUFFIX, replacing, write_bytes, write_text
 from stereoforge_kit.files.locks import alone, locked

@@ -1,4 +1,4 @@
-"""Temporary folders that somebody clears away, whatever becomes of the process that made them.
+"""Temporary folders that are removed whatever happens to the process that made them.
 
 Their maker holds a lock on a file in the folder for as long as it lives, and the system frees that lock
 however the process ends. A folder whose lock is free is abandoned: whoever next makes one beside it, or ends

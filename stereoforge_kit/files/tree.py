@@ -14,6 +14,7 @@ from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files.atomic import replacing, write_bytes
 from stereoforge_kit.files.temporary import temporary_folder
 
@@ -201,7 +202,7 @@ def open_tree(root: Path | str) -> Tree:
     except (ValueError, ImportError) as error:
         if isinstance(error, ModuleNotFoundError):
             raise
-        raise ValueError(f"{root}: {error} (pip install 'stereoforge[cloud]' brings s3://)") from error
+        raise InputError(f"{root}: {error} (pip install 'stereoforge[cloud]' brings s3://)") from error
     return tree
 
 

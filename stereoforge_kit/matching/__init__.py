@@ -5,8 +5,8 @@ Numpy arrays in and out; knows nothing of data sets, networks or the refinement,
 
 from stereoforge_kit.matching.consistency import INCONSISTENT, left_right_consistency
 from stereoforge_kit.matching.holes import fill_background, fill_nearest
-from stereoforge_kit.matching.order import seem_swapped
 from stereoforge_kit.matching.sgbm import SGBMParameters, match_both, match_sgbm
+from stereoforge_kit.matching.swapped_views import seem_swapped
 
 __all__ = [
     "INCONSISTENT",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from stereoforge_kit.errors import InputError
+
 INCONSISTENT = -1.0
 """Value where the matching column is outside the image, or either view has no disparity."""
 
@@ -26,7 +28,7 @@ def left_right_consistency(
         ValueError: If the maps differ in shape.
     """
     if disparity_left.shape != disparity_right.shape or disparity_left.ndim != 2:
-        raise ValueError(
+        raise InputError(
             f"both disparities must be (H, W) and alike, got {disparity_left.shape} and {disparity_right.shape}"
         )
     width = disparity_left.shape[1]

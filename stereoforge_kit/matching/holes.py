@@ -1,4 +1,4 @@
-"""Giving pixels without a disparity one from their surroundings."""
+"""Fill pixels without a disparity from their surroundings."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def fill_nearest(disparity: NDArray[Real]) -> NDArray[Real]:
 def fill_background(disparity: NDArray[np.float32]) -> NDArray[np.float32]:
     """The (H, W) map with every NaN replaced by the smaller of the next known values of its row to either side.
 
-    What the KITTI stereo benchmark does before it compares: a pixel without a match is most often hidden from the
-    other view, and what is hidden lies behind. Rows without any value take the nearest of other rows.
+    What the KITTI stereo benchmark does before it compares: a pixel without a match is most often occluded in the
+    other view, and what is occluded lies behind. Rows without any value take the nearest of other rows.
     """
     unknown = np.isnan(disparity)
     if not unknown.any():

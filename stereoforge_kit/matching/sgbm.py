@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from stereoforge_kit.errors import InputError
+
 SUBPIXELS = 16
 """OpenCV gives disparities as integers in units of 1/16 px."""
 _MODES = {
@@ -40,16 +42,16 @@ class SGBMParameters:
 
     def __post_init__(self) -> None:
         if self.max_disparity_px < 1:
-            raise ValueError(f"SGBM's max_disparity_px must be at least 1, got {self.max_disparity_px}")
+            raise InputError(f"SGBM's max_disparity_px must be at least 1, got {self.max_disparity_px}")
         if self.block_px < 1 or self.block_px % 2 == 0:
-            raise ValueError(f"SGBM's block_px must be odd, got {self.block_px}")
+            raise InputError(f"SGBM's block_px must be odd, got {self.block_px}")
         if not 0 <= self.small_penalty < self.large_penalty:
-            raise ValueError(
+            raise InputError(
                 "SGBM's penalties must be at least 0, the large one larger than the small one, got "
                 f"{self.small_penalty} and {self.large_penalty}"
             )
         if not 0 <= self.uniqueness_percent <= 100 or self.speckle_px < 0:
-            raise ValueError("SGBM's uniqueness_percent is 0 to 100 and its speckle_px at least 0")
+            raise InputError("SGBM's uniqueness_percent is 0 to 100 and its speckle_px at least 0")
 
 
 def match_sgbm(
@@ -70,9 +72,9 @@ def match_sgbm(
     """
     for image in (left, right):
         if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or image.size == 0:
-            raise ValueError(f"SGBM takes images (H, W, 3) of uint8, got {image.shape} of {image.dtype}")
+            raise InputError(f"SGBM takes images (H, W, 3) of uint8, got {image.shape} of {image.dtype}")
     if left.shape != right.shape:
-        raise ValueError(f"the images differ in size: {left.shape[:2]} and {right.shape[:2]}")
+        raise InputError(f"the images differ in size: {left.shape[:2]} and {right.shape[:2]}")
     disparities = -(-parameters.max_disparity_px // 16) * 16
     area = 3 * parameters.block_px**2
     matcher = cv2.StereoSGBM.create(

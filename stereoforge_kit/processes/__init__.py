@@ -1,4 +1,4 @@
-"""Processes that may crash, hang or eat memory without harm: what runs in them is limited and replaceable."""
+"""Worker processes with limits, which may crash, hang or run out of memory without harm to their parent."""
 
 from stereoforge_kit.processes.call import call_limited
 from stereoforge_kit.processes.limits import Limits, available_memory_bytes

@@ -1,4 +1,4 @@
-"""One call in a process of its own, for work on input that nobody vouches for."""
+"""One call in a process of its own, for work on untrusted input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a worker process may use, and what there is."""
+"""Limits of time and memory for worker processes."""
 
 from __future__ import annotations
 

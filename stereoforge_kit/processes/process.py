@@ -1,4 +1,4 @@
-"""One worker process, watched from outside: its time, its memory, its end, and everything it prints.
+"""One worker process, supervised from outside: its time, memory, end and output.
 
 Each worker has a pipe of its own and shares no lock with anyone, so that it can be killed at any moment
 without harm to the others. It dies with the process that started it.
@@ -27,6 +27,7 @@ from multiprocessing.reduction import DupFd
 from pathlib import Path
 from typing import Any, Literal
 
+from stereoforge_kit.errors import UserError
 from stereoforge_kit.processes.limits import Limits
 
 POLL_S = 0.1
@@ -45,7 +46,7 @@ _SIGNALS_FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 _capture: Path | None = None
 
 
-class WorkerError(RuntimeError):
+class WorkerError(UserError):
     """A worker process ended, or was ended, before it gave a result; the message is one sentence."""
 
     def __init__(self, kind: FailureKind, sentence: str) -> None:
@@ -130,10 +131,12 @@ class WorkerProcess:
 
     @property
     def alive(self) -> bool:
+        """Whether the process takes another call."""
         return self._process.is_alive()
 
     @property
     def pid(self) -> int:
+        """The process's number."""
         assert self._process.pid is not None
         return self._process.pid
 

@@ -13,6 +13,8 @@ from matplotlib import colormaps
 from matplotlib.colors import hsv_to_rgb
 from numpy.typing import ArrayLike, NDArray
 
+from stereoforge_kit.errors import InputError
+
 Picture = NDArray[np.uint8]
 """(H, W, 3), 8-bit sRGB, row 0 at the top."""
 
@@ -44,7 +46,7 @@ def disparity_picture(disparity: ArrayLike, maximum: float | None = None) -> Pic
     if maximum is None:
         maximum = max(float(np.max(values, initial=0.0, where=np.isfinite(values))), 1.0)
     if not maximum > 0:
-        raise ValueError(f"the maximum disparity of a picture must be positive, got {maximum}")
+        raise InputError(f"the maximum disparity of a picture must be positive, got {maximum}")
     return _mapped(values / maximum, "magma")
 
 
@@ -63,7 +65,7 @@ def error_picture(error: ArrayLike, threshold: float) -> Picture:
         threshold: Errors strictly above it are bad, in pixels.
     """
     if not threshold > 0:
-        raise ValueError(f"the error threshold of a picture must be positive, got {threshold}")
+        raise InputError(f"the error threshold of a picture must be positive, got {threshold}")
     size = np.abs(_plane(error, "error")) / threshold
     share = np.nan_to_num(size, nan=0.0)
     good = _blend(_GOOD_COLORS, np.clip(share, 0, 1))
@@ -81,7 +83,7 @@ def occlusion_picture(labels: ArrayLike, image: ArrayLike) -> Picture:
     classes = _plane(labels, "occlusion")
     picture = np.repeat((_image(image, "image") @ LUMA)[..., None], 3, axis=2)
     if classes.shape != picture.shape[:2]:
-        raise ValueError(f"occlusion {classes.shape} and image {picture.shape[:2]} differ in size")
+        raise InputError(f"occlusion {classes.shape} and image {picture.shape[:2]} differ in size")
     for label, color in ((1, OCCLUDED_COLOR), (2, OUT_OF_FRAME_COLOR)):
         chosen = classes == label
         picture[chosen] = 0.3 * picture[chosen] + 0.7 * np.array(color)
@@ -100,9 +102,9 @@ def gradient_picture(gradient: ArrayLike, maximum: float = 0.5) -> Picture:
     """
     values = np.asarray(gradient, dtype=np.float64)
     if values.ndim != 3 or values.shape[2] != 2:
-        raise ValueError(f"a gradient is (H, W, 2), got shape {values.shape}")
+        raise InputError(f"a gradient is (H, W, 2), got shape {values.shape}")
     if not maximum > 0:
-        raise ValueError(f"the maximum gradient of a picture must be positive, got {maximum}")
+        raise InputError(f"the maximum gradient of a picture must be positive, got {maximum}")
     invalid = np.isnan(values).any(axis=2)
     dx, dy = np.moveaxis(np.nan_to_num(values), 2, 0)
     hue = (np.arctan2(dy, dx) / (2 * np.pi)) % 1.0
@@ -111,7 +113,7 @@ def gradient_picture(gradient: ArrayLike, maximum: float = 0.5) -> Picture:
 
 
 def normals_picture(normals: ArrayLike) -> Picture:
-    """Surface normals (H, W, 3), x right, y up, z towards the eye: -1..1 as red, green, blue; the sky dark."""
+    """Surface normals (H, W, 3), x right, y up, z towards the camera: -1..1 as red, green, blue; the sky dark."""
     values = _image(normals, "normals")
     nothing = ~values.any(axis=2, keepdims=True)
     return _rounded(np.where(nothing, 38.0, 127.5 * (values + 1)))
@@ -128,13 +130,13 @@ def index_picture(index: ArrayLike) -> Picture:
 
 
 def anaglyph(left: ArrayLike, right: ArrayLike) -> Picture:
-    """The pair for red-cyan glasses: the left eye's brightness in red, the right eye's green and blue.
+    """The pair for red-cyan glasses: the left view's brightness in red, the right view's green and blue.
 
     (A half-colour anaglyph: a full-colour one makes red things flicker between the eyes.)
     """
     first, second = _image(left, "left image"), _image(right, "right image")
     if first.shape != second.shape:
-        raise ValueError(f"left {first.shape[:2]} and right {second.shape[:2]} differ in size")
+        raise InputError(f"left {first.shape[:2]} and right {second.shape[:2]} differ in size")
     return _rounded(np.concatenate([(first @ LUMA)[..., None], second[..., 1:]], axis=2))
 
 
@@ -171,7 +173,7 @@ def _joined(pictures: Sequence[ArrayLike], gap: int, color: int, axis: int) -> P
     if len({image.shape[1 - axis] for image in images}) != 1:
         across = "width" if axis == 0 else "height"
         sizes = [image.shape[:2] for image in images]
-        raise ValueError(f"pictures to join must be at least one and share their {across}, got sizes {sizes}")
+        raise InputError(f"pictures to join must be at least one and share their {across}, got sizes {sizes}")
     spacer_shape = list(images[0].shape)
     spacer_shape[axis] = gap
     spacer = np.full(spacer_shape, color, np.uint8)
@@ -210,12 +212,12 @@ def _rounded(values: NDArray[np.float64]) -> Picture:
 def _plane(array: ArrayLike, name: str) -> NDArray[np.float64]:
     values = np.asarray(array, dtype=np.float64)
     if values.ndim != 2:
-        raise ValueError(f"{name} must be (H, W), got shape {values.shape}")
+        raise InputError(f"{name} must be (H, W), got shape {values.shape}")
     return values
 
 
 def _image(array: ArrayLike, name: str) -> NDArray[np.float64]:
     values = np.asarray(array, dtype=np.float64)
     if values.ndim != 3 or values.shape[2] != 3:
-        raise ValueError(f"the {name} must be (H, W, 3), got shape {values.shape}")
+        raise InputError(f"the {name} must be (H, W, 3), got shape {values.shape}")
     return values

@@ -1,4 +1,4 @@
-"""How far a long job is and how long it still takes: a bar on a terminal, lines in a log."""
+"""Progress of long jobs with the time left: a bar on a terminal, lines in a log."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PACE_OVER_S = 300.0
 
 
 class JobProgress(Progress):
-    """One look for every long job.
+    """A progress display for long jobs.
 
     Where the output is a file or a pipe a bar would show nothing until its end, so what it says comes as a line now and
     then.
@@ -54,10 +54,12 @@ class JobProgress(Progress):
         self._said = time.monotonic()
 
     def update(self, task_id: TaskID, **changes: Any) -> None:
+        """As `rich.progress.Progress.update`."""
         super().update(task_id, **changes)
         self._say(task_id)
 
     def advance(self, task_id: TaskID, advance: float = 1) -> None:
+        """As `rich.progress.Progress.advance`."""
         super().advance(task_id, advance)
         self._say(task_id)
 
@@ -78,7 +80,7 @@ class JobProgress(Progress):
 
 
 def duration(seconds: float) -> str:
-    """A time as one says it: "40 s", "12 min", "3 h 05 min", "4.2 days"."""
+    """A duration for people: "40 s", "12 min", "3 h 05 min", "4.2 days"."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)

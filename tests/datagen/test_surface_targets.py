@@ -21,7 +21,8 @@ from datagen.formats import write_flow, write_mask, write_normals, write_pfm, wr
 from datagen.gallery.page import write_gallery
 from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.scene_geometry import SceneGeometry
-from datagen.ground_truth.targets import STEP, PixelSurfaces
+from datagen.ground_truth.targets import STEP, ExtraTargets, PixelSurfaces
+from datagen.recipe.recipe import read_recipe, recipe_to_text
 from datagen.verify.run import verify_dataset
 from scenes import FAMILIES, Scene
 from scenes.motion.trajectories import quaternion
@@ -177,6 +178,24 @@ def test_flow_disparity_change_and_normals_have_their_closed_form(
         assert np.percentile(np.linalg.norm(flow - other, axis=-1)[~rim], 50) > TOLERANCE_PX, name
 
 
+@pytest.mark.parametrize("kinds", [(), *((kind,) for kind in EXTRA_TARGETS), EXTRA_TARGETS])
+def test_only_what_was_asked_for_is_made(kinds: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A target costs nothing where it is not wanted: flow is followed for flow and motion boundaries alone."""
+    followed: list[Direction] = []
+    flow = PixelSurfaces.flow
+
+    def counted(surfaces: PixelSurfaces, direction: Direction) -> NDArray[np.float32]:
+        followed.append(direction)
+        return flow(surfaces, direction)
+
+    monkeypatch.setattr(PixelSurfaces, "flow", counted)
+    caster = SceneRayCaster(SceneGeometry(moving_plane(KINDS["rigid"])))
+    index = caster.cast_all("left", NOW).object_index
+    made = ExtraTargets(caster, kinds).make("left", NOW, index)
+    assert {kind for kind, _ in made} == set(kinds)
+    assert followed == (list(DIRECTIONS) if {"optical_flow", "motion_boundaries"} & set(kinds) else [])
+
+
 def test_points_that_go_behind_the_camera_have_no_flow() -> None:
     scene = moving_plane(np.zeros((3, 3)))
     path = Trajectory((0.0, 2.0), ((0.0, 0.0, -2.0), (0.0, 0.0, 9.0)), ((1.0, 0.0, 0.0, 0.0),) * 2)
@@ -320,6 +339,67 @@ def test_verify_finds_targets_that_are_not_of_the_scene(dataset: Path, tmp_path:
         path.write_bytes(good)
     commit_again(root)
     assert verify_dataset(root, workers=1).problems == ()
+
+
+def keep_targets(root: Path, kinds: tuple[str, ...]) -> None:
+    """Make it the set that is rendered with these targets only."""
+    layout = Layout(root)
+    recipe = replace(read_recipe(layout.recipe), targets=kinds)
+    layout.recipe.write_text(recipe_to_text(recipe), encoding="utf-8")
+    for kind in set(EXTRA_TARGETS) - set(kinds):
+        shutil.rmtree(root / kind)
+    path = layout.manifest("train", 0)
+    manifest = read_manifest(path)
+    files = tuple(entry for entry in manifest.files if (root / entry.path).is_file())
+    write_manifest(path, replace(manifest, files=files, recipe_sha256=recipe.settings_sha256()))
+
+
+@pytest.mark.parametrize("mistake", ["none marked", "all marked", "moved by a pixel"])
+def test_motion_boundaries_are_verified_without_stored_flow_too(
+    mistake: str, dataset: Path, tmp_path: Path
+) -> None:
+    root = Path(shutil.copytree(dataset, tmp_path / "set"))
+    keep_targets(root, ("motion_boundaries",))
+    assert verify_dataset(root, workers=1).problems == ()
+    sample = StereoDataset(root, "train")[0]
+    right = sample.motion_boundaries("left", "into_past")
+    wrong = {
+        "none marked": right & False,
+        "all marked": right | True,
+        "moved by a pixel": np.roll(right, 1, axis=1),
+    }[mistake]
+    write_mask(Layout(root).file("motion_boundaries", "train", 0, "left", sample.frame, "into_past"), wrong)
+    commit_again(root)
+    (problem,) = verify_dataset(root, workers=1).problems
+    assert "pixels of motion boundaries are marked otherwise than the scene's geometry says" in str(problem)
+
+
+@pytest.mark.parametrize("kind", EXTRA_TARGETS)
+def test_targets_are_read_and_what_follows_from_others_compared_without_rays_too(
+    kind: str, dataset: Path, tmp_path: Path
+) -> None:
+    root = Path(shutil.copytree(dataset, tmp_path / "set"))
+    layout, sample = Layout(root), StereoDataset(root, "train")[0]
+    direction: Direction | None = None if kind in ("material_index", "normals") else "into_past"
+    path = layout.file(kind, "train", 0, "left", sample.frame, direction)
+    if kind == "material_index":
+        write_png(path, sample.material_index("left") + np.uint16(1))
+    elif kind == "motion_boundaries":
+        write_mask(path, ~sample.motion_boundaries("left", "into_past"))
+    else:
+        path.write_bytes(path.read_bytes()[:100])
+    commit_again(root)
+    (problem,) = verify_dataset(root, workers=1, sampled_pixels=0).problems
+    assert kind in problem.place
+
+
+def test_objects_beyond_the_scene_are_a_problem_and_no_crash(dataset: Path, tmp_path: Path) -> None:
+    root = Path(shutil.copytree(dataset, tmp_path / "set"))
+    sample = StereoDataset(root, "train")[0]
+    path = Layout(root).file("object_index", "train", 0, "left", sample.frame)
+    write_png(path, sample.object_index_left + np.uint16(1000))
+    commit_again(root)
+    assert "is beyond the scene's" in "".join(map(str, verify_dataset(root, workers=1).problems))
 
 
 def test_flow_loaders_find_the_published_names(dataset: Path) -> None:

@@ -16,7 +16,7 @@ from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.scene_geometry import SceneGeometry
 from datagen.recipe.curation import fault_before_rendering
 from datagen.recipe.recipe import Recipe
-from refine.methods.base import EvaluationFrame
+from refine.method import EvaluationFrame
 from scenes import scene_from_json, scene_to_json
 from scenes.random_draws import integer
 

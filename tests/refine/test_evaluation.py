@@ -12,11 +12,10 @@ import pytest
 
 from refine import MRFParameters, refine_disparity
 from refine.evaluation.evaluate import EvaluationFrame, EvaluationOptions, evaluate
-from refine.methods.base import Method, MethodOutput
+from refine.method import Method, MethodOutput
 from refine.methods.gradnet import GradNet
 from refine.methods.ours import Ours
 from refine.methods.ours_conf_gt import OursConfGT
-from refine.methods.registry import default_methods, known_methods
 from refine.methods.regressor import Regressor
 from refine.metrics import (
     bad_pixel_rate,
@@ -26,6 +25,7 @@ from refine.metrics import (
     sparsification_curve,
 )
 from refine.mrf.posterior import posterior_deviation
+from refine.registry import default_methods, known_methods
 from tests.refine.worlds import toy_frame
 
 MAIN_ROWS = default_methods(("regressor", "gradnet", "ours", "ours_conf_gt"))

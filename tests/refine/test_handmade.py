@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from refine.heuristic_inputs import UNCONFIRMED, consistency_confidence, local_slopes
+from refine.heuristic_inputs import UNCONFIRMED, consistency_confidence, local_gradients
 from stereoforge_kit.matching import SGBMParameters, left_right_consistency, match_both
 from tests.refine.worlds import random_problem
 from tests.training.synthetic import random_pair
@@ -44,9 +44,9 @@ def test_slopes_of_planes_are_found_through_noise_and_edges():
     disparity = (truth + rng.normal(0, 0.1, truth.shape)).astype(np.float32)
     confidence = (rng.random(truth.shape) < 0.8).astype(np.float32)
     disparity[confidence == 0] += 10
-    slopes = local_slopes(disparity, confidence, image)
+    slopes = local_gradients(disparity, confidence, image)
     inner = (slice(8, -8), slice(8, -8))
     expected = np.where(near[..., None], [-0.2, 0.1], [0.05, -0.03])
     assert np.abs(slopes - expected)[inner].mean() < 0.01
     assert np.abs(slopes - expected)[inner].max() < 0.05
-    assert (local_slopes(disparity, np.zeros_like(confidence), image) == 0).all()
+    assert (local_gradients(disparity, np.zeros_like(confidence), image) == 0).all()

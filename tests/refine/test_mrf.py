@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import doctest
+import sys
 import warnings
 
 import numpy as np
@@ -342,3 +344,9 @@ def test_the_colour_term_alone_takes_long_but_converges():
 
 def test_neighbours_are_the_eight_around():
     assert set(NEIGHBORS) == {(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)} - {(0, 0)}
+
+
+def test_the_examples_in_the_docstrings_run():
+    failed, tried = doctest.testmod(sys.modules[refine_disparity.__module__])
+    assert tried > 10
+    assert not failed

@@ -130,8 +130,8 @@ def test_descending_the_gradients_finds_a_confidence_that_helps():
 @pytest.mark.usefixtures("solver")
 def test_what_does_not_converge_says_so(monkeypatch):
     for limit in (
-        "differentiable.MAX_ITERATIONS",
-        "differentiable.MAX_ROUNDS",
+        "mrf.torch.differentiable.MAX_ITERATIONS",
+        "mrf.torch.differentiable.MAX_ROUNDS",
         "solvers.multigrid.MAX_ITERATIONS",
     ):
         monkeypatch.setattr(f"refine.{limit}", 2)

@@ -16,8 +16,8 @@ from refine.evaluation.archive import read_evaluation, write_evaluation
 from refine.evaluation.bootstrap import bootstrap
 from refine.evaluation.evaluate import EvaluationFrame, evaluate
 from refine.evaluation.results import EvaluatedSet, results_csv, results_json
-from refine.methods.registry import default_methods
 from refine.metrics import kitti_d1
+from refine.registry import default_methods
 from refine.report.paper_tables import paper_tables
 from refine.report.published import PAPER, counterpart
 from refine.report.table_files import tables_csv, tables_json, tables_latex, tables_markdown

@@ -14,7 +14,7 @@ import pytest
 
 from refine.evaluation.evaluate import EvaluationOptions, evaluate
 from refine.evaluation.results import EvaluatedSet
-from refine.methods.registry import default_methods
+from refine.registry import default_methods
 from refine.report.crop_selection import most_improved_boundary, worst_boundary
 from refine.report.overview import overview_picture
 from refine.report.write import ReportContext, write_report
@@ -243,7 +243,7 @@ def brute_force_window(score: np.ndarray, size: tuple[int, int]) -> tuple[slice,
     return max(windows, key=lambda window: score[window].sum())
 
 
-def test_the_lens_finds_the_boundary_with_most_error_or_gain():
+def test_crop_selection_finds_the_boundary_with_most_error_or_gain():
     frame = toy_frame(3)
     halo = np.abs(frame.disparity - frame.truth) > 3
     refined = frame.disparity.copy()
@@ -257,7 +257,7 @@ def test_the_lens_finds_the_boundary_with_most_error_or_gain():
     assert halo[gain].sum() >= 0.9 * right_halo[brute_force_window(right_halo, size)].sum()
 
 
-def test_the_lens_stays_in_the_frame_and_needs_a_boundary():
+def test_crop_selection_stays_in_the_frame_and_needs_a_boundary():
     frame = toy_frame(3)
     assert worst_boundary(frame.disparity, np.full_like(frame.truth, 5), (16, 20)) is None
     whole = worst_boundary(frame.disparity, frame.truth, (500, 500))

@@ -21,10 +21,10 @@ from refine.evaluation.tuning import (
     tune_method,
     with_value,
 )
-from refine.methods.base import EvaluationFrame, Method, MethodOutput
+from refine.method import EvaluationFrame, Method, MethodOutput
 from refine.methods.ours import Ours
 from refine.methods.ours_conf_gt import OursConfGT
-from refine.methods.registry import default_methods
+from refine.registry import default_methods
 from tests.refine.worlds import toy_frame
 
 

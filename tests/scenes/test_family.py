@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from scenes import FAMILIES
+from scenes.families.flying_things import FlyingThingsConfig
 
 NAN, INFINITY = float("nan"), float("inf")
 
@@ -37,3 +39,14 @@ def test_every_family_says_what_of_it_can_be_fewer_and_shows_files_of_the_user_s
     kind = FAMILIES[family]
     assert kind.takes_assets
     assert kind.config().at_complexity(0.0) != kind.config()
+
+
+@pytest.mark.parametrize("emptiest", [0.1, 0.5])
+def test_every_family_s_emptiest_worlds_have_the_same_share_left(
+    emptiest: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("scenes.family.EMPTIEST", emptiest)
+    street = FAMILIES["driving"].config()
+    assert street.at_complexity(0.0).parked_share == tuple(each * emptiest for each in street.parked_share)
+    emptied = FlyingThingsConfig().at_complexity(0.0)
+    assert emptied.count(np.random.default_rng(0), (100, 100)) == round(100 * emptiest)

@@ -23,11 +23,13 @@ from datagen import StereoDataset
 from datagen.formats import read_pfm
 from refine.evaluation.settings import read_settings
 from refine.evaluation.tuning import measure
-from refine.methods.registry import known_methods
+from refine.registry import known_methods
 from stereoforge.cli import main
 from stereoforge.commands import COMMANDS, command_class, command_summary
+from stereoforge.errors import UsageError
 from stereoforge.pipelines.demo import DemoPlan, DemoResult, run_demo
 from stereoforge.pipelines.prediction import open_predictors
+from stereoforge_kit.errors import InputError
 
 RenderTiny = ["render", "--scenes", "1", "--size", "64x36", "--samples", "1", "--workers", "1"]
 
@@ -71,6 +73,34 @@ def test_every_command_has_help_with_defaults(command: str, capsys: pytest.Captu
     text = capsys.readouterr().out
     assert f"stereoforge {command}" in text
     assert "--" in text
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "sentence"),
+    [
+        (InputError("views.png: is empty"), 1, "stereoforge: views.png: is empty"),
+        (UsageError("--size takes WxH"), 2, "stereoforge: --size takes WxH"),
+        (
+            ValueError("shapes (2,) (3,)"),
+            1,
+            "stereoforge: unexpected ValueError: shapes (2,) (3,) (run again with --debug to see where)",
+        ),
+    ],
+)
+def test_only_errors_for_people_are_shown_as_they_are(
+    error: Exception,
+    code: int,
+    sentence: str,
+    monkeypatch: pytest.MonkeyPatch,
+    refused: Callable[..., str],
+) -> None:
+    """A library's bare ValueError is a fault of the program, and says how to see where."""
+
+    def fail(_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(command_class("view"), "run", fail)
+    assert refused(code, "view", "set", "--out", "page.html") == sentence
 
 
 def test_the_module_and_the_script_are_one_program() -> None:

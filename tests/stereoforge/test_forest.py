@@ -40,8 +40,11 @@ def test_the_forest_joins_the_run_folder(world, capsys):
     np.testing.assert_array_equal(stored.value, forest.value)
     sample = open_source(str(data)).frames("val")[0]
     # The synthetic set has no occlusion labels.
-    bare = {name: getattr(sample, name) for name in ("name", "left", "right", "disparity_left", "size")}
-    frame = open_predictors(run).frame(SimpleNamespace(**bare, occlusion_left=None, object_index_left=None))
+    bare = {
+        name: getattr(sample, name)
+        for name in ("name", "scene_name", "left", "right", "disparity_left", "size")
+    }
+    frame = open_predictors(run).frame(SimpleNamespace(**bare, occlusion_left=None, foreground_left=None))
     confidence = frame.other_confidences["rdf"]
     assert confidence.shape == frame.truth.shape
     assert ((confidence >= 0) & (confidence <= 1)).all()

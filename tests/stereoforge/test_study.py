@@ -14,7 +14,7 @@ import yaml
 
 from refine.evaluation.evaluate import evaluate
 from refine.evaluation.results import EvaluatedSet
-from refine.methods.registry import default_methods
+from refine.registry import default_methods
 from scenes import FAMILIES
 from stereoforge.cli import main
 from stereoforge.errors import CommandError, UsageError

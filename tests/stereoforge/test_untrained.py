@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from datagen.formats import write_png
-from refine.methods.registry import default_methods
+from refine.registry import default_methods
 from stereoforge.cli import main
 from stereoforge.pipelines.prediction import untrained, untrained_notes
 from tests.datagen.analytic_world import write_dataset

@@ -49,6 +49,7 @@ class PseudoFrames(Sequence[StereoFrame]):
         frame = self._frames[index]
         return FileFrame(
             name=frame.name,
+            scene_name=frame.scene_name,
             read_left=partial(getattr, frame, "left"),
             read_right=partial(getattr, frame, "right"),
             read_disparity_left=partial(_read, self._files[index]),

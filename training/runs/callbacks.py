@@ -16,8 +16,9 @@ from training.tasks import StereoTask
 class BestWeights(pl.Callback):
     """Hands the network over for saving whenever its validation figure is the best so far.
 
-    Without validation frames, or where they have no truth for the figure, the latest weights are the best. The
-    figure to beat is part of the checkpoint, so a resumed run goes on comparing.
+    Until there is a finite figure, the latest weights are the best: without validation frames, or where they have no
+    truth for it, to the end. A figure that is not finite never beats one that is. The figure to beat is part of the
+    checkpoint, so a resumed run goes on comparing.
     """
 
     def __init__(self, save: Callable[[int, dict[str, float]], None]) -> None:
@@ -32,9 +33,9 @@ class BestWeights(pl.Callback):
         self._step = trainer.global_step
         figures = validation_figures(trainer)
         value = figures.get(pl_module.monitor.removeprefix("validation/"))
-        if value is None or math.isnan(value):  # nothing to measure: the latest weights are the best
+        if value is None or not math.isfinite(value):
             value = math.inf
-        elif not value < self._best:
+        if math.isfinite(self._best) and value >= self._best:
             return
         self._best = value
         if trainer.is_global_zero:

@@ -126,8 +126,18 @@ class StereoTask(pl.LightningModule):
 
     def validation_step(self, batch: Batch, batch_idx: int) -> None:
         figures, maps = self.validate_frame(batch)
+        answered = not any(bool(torch.isnan(each).all()) for each in maps.values())
         for name, value in figures.items():
-            self.log(f"validation/{name}", value, batch_size=1, on_step=False, on_epoch=True, sync_dist=True)
+            # A frame whose truth says nothing of a figure does not count; one for which the network has no number does.
+            unknown = answered and bool(torch.isnan(value))
+            self.log(
+                f"validation/{name}",
+                torch.zeros_like(value) if unknown else value,
+                batch_size=0 if unknown else 1,
+                on_step=False,
+                on_epoch=True,
+                sync_dist=True,
+            )
         if batch_idx < PANELS and self.logger is not None and self.trainer.is_global_zero:
             picture = self.panel(batch, maps)
             self.logger.experiment.add_image(

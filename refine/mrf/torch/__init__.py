@@ -1,1 +1,1 @@
-"""The MRF as a differentiable torch function, for batches."""
+"""The MRF in torch: batched and differentiable."""

@@ -29,9 +29,11 @@ from refine.energy.parameters import MRFParameters
 from refine.energy.system import Form
 from refine.mrf.torch.aggregation import AggregationCycle
 from refine.solvers import SolverError
-from refine.solvers.multigrid import GivenSystem
-from refine.solvers.stencils import Couplings, crop
-from refine.solvers.stencils import pad as padded
+from refine.solvers.multigrid import MultigridSolver
+from refine.solvers.stencil.padding import crop
+from refine.solvers.stencil.padding import pad as padded
+from refine.solvers.stencil.weights import StencilWeights
+from stereoforge_kit.errors import InputError
 
 Map = Callable[[Tensor], Tensor]
 
@@ -46,7 +48,7 @@ _SINGLE = 1e-6
 
 @dataclass(frozen=True)
 class ImageWeights:
-    """What ties pixels together, (B, ...) tensors; as `refine.energy.affinity` computes it, or anything else."""
+    """Affinities of a batch, as `refine.energy.affinity` or a network gives them."""
 
     phi_x: Tensor
     """(B, H, W)."""
@@ -109,12 +111,12 @@ def refine_batch(
     """
     batch, height, width = disparity.shape
     if confidence.shape != disparity.shape or gradient.shape != (batch, 2, height, width):
-        raise ValueError(
+        raise InputError(
             f"disparity {tuple(disparity.shape)}, confidence {tuple(confidence.shape)} and gradient "
             f"{tuple(gradient.shape)} do not fit; expected (B, H, W), (B, H, W), (B, 2, H, W)"
         )
     if not disparity.isfinite().all():
-        raise ValueError("disparity must be finite; fill what is missing and give it confidence 0")
+        raise InputError("disparity must be finite; fill what is missing and give it confidence 0")
     tau = confidence.clamp(min=parameters.confidence_floor)
     known = gradient.isfinite()
     wanted = torch.where(known, gradient, torch.zeros_like(gradient))
@@ -208,7 +210,7 @@ class _System:
         self._parts = tuple(part.detach().double() for part in parts)
         self._singles = tuple(part.float() for part in self._parts)
         self._cycles: dict[bool, AggregationCycle] = {}
-        self._kernels: list[GivenSystem] = []
+        self._kernels: list[MultigridSolver] = []
 
     def solve(self, b: Tensor, start: Tensor, tolerance: float, transposed: bool = False) -> Tensor:
         """A x = b, or A' x = b, in b's precision; raises SolverError where the tolerance is not reached."""
@@ -234,21 +236,25 @@ class _System:
         return x.to(b.dtype)
 
     def _solve_by_kernels(self, apply: Map, b: Tensor, x: Tensor, target: Tensor) -> Tensor:
-        """By `refine.solvers`, a sample at a time. Its coefficients are float32; what they leave of the residual is
-        solved for again."""
+        """By `refine.solvers`, a sample at a time.
+
+        Its coefficients are float32, so the residual of its solution is solved for again.
+        """
         if not all(bool(part.isfinite().all()) for part in self._singles):
             return x  # which is then found to be no solution
         if not self._kernels:
-            self._kernels = [GivenSystem(_couplings(*sample)) for sample in zip(*self._singles, strict=True)]
+            self._kernels = [
+                MultigridSolver(_stencil_weights(*sample)) for sample in zip(*self._singles, strict=True)
+            ]
         for _ in range(MAX_ROUNDS):
             residual = b - apply(x)
-            left = _norm(residual)
-            open_ = torch.nonzero(left.flatten() > target.flatten()).flatten().tolist()
+            norm = _norm(residual)
+            open_ = torch.nonzero(norm.flatten() > target.flatten()).flatten().tolist()
             if not open_:
                 break
             x = x.clone()
             for i in open_:
-                share = max(float(target[i] / left[i]) / 2, _SINGLE)
+                share = max(float(target[i] / norm[i]) / 2, _SINGLE)
                 found = self._kernels[i].solve(padded(residual[i].numpy(), np.float64), share)
                 x[i] += torch.from_numpy(crop(found.x))
         return x
@@ -267,11 +273,13 @@ def _has_kernels(form: Form, b: Tensor) -> bool:
     return form == "exact" and b.device.type == "cpu"
 
 
-def _couplings(tau: Tensor, axial_x: Tensor, axial_y: Tensor, color: Tensor, weights: Tensor) -> Couplings:
+def _stencil_weights(
+    tau: Tensor, axial_x: Tensor, axial_y: Tensor, color: Tensor, weights: Tensor
+) -> StencilWeights:
     """Of one sample, as `refine.solvers` has them."""
     axial = torch.stack([pad(axial_x, (0, 1)), pad(axial_y, (0, 0, 0, 1))])
     weights = weights * torch.stack([_neighbor(torch.ones_like(tau), k) for k in range(8)])
-    return Couplings(*(padded(part.numpy()) for part in (tau, weights, axial, color)))
+    return StencilWeights(*(padded(part.numpy()) for part in (tau, weights, axial, color)))
 
 
 def _dot(a: Tensor, b: Tensor) -> Tensor:

@@ -1,5 +1,6 @@
 """Every reader on files in the published encoding: values, signs, rows, holes, labels; and the choice of reader."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from datagen import DatasetError
 from datagen.dataset.shards import CACHE_VARIABLE
 from datagen.ground_truth.from_disparity import derive_occlusion
 from datagen.sources.registry import DataSource, open_source, source_formats
+from datagen.sources.webdataset import scene_of
 from tests.datagen.sources import published
 from tests.datagen.sources.published import World, png, shard, shard_members, world
 
@@ -92,6 +94,102 @@ def test_final_passes(tmp_path: Path) -> None:
     np.testing.assert_array_equal(frame.right, w.left)
 
 
+SCENES = {
+    "flyingthings3d": "TRAIN/B/0017",
+    "driving": "driving",
+    "monkaa": "eating",
+    "sintel": "alley_1",
+    "kitti2012": "000003_10",
+    "kitti2015": "000003_10",
+    "middlebury": "Adirondack",
+    "eth3d": "delivery_area",
+    "middlebury2003": "cones",
+    "crestereo": "tree/0a1b",
+    "webdataset": "train-0000",
+}
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_a_frame_says_which_scene_it_is_of(name: str, tmp_path: Path) -> None:
+    SETS[name](tmp_path)
+    assert open_source(tmp_path).frames("train")[0].scene_name == SCENES[name]
+
+
+@pytest.mark.parametrize(
+    ("folders", "scenes"),
+    [
+        (
+            ["Piano", "PianoL", "Classroom2", "Classroom2E", "Teddy"],
+            ["Piano"] * 2 + ["Classroom"] * 2 + ["Teddy"],
+        ),
+        (["Sword1-perfect", "Sword1-imperfect", "Mask-perfect"], ["Sword", "Sword", "Mask"]),
+        (["chess1", "chess2", "artroom1"], ["chess", "chess", "artroom"]),
+        (["trainingQ/ArtL", "trainingF/ArtL"], ["Art", "Art"]),
+        (["0001", "0002", "room_12", "room_13"], ["0001", "0002", "room_12", "room_13"]),
+    ],
+)
+def test_pictures_of_one_middlebury_scene(folders: list[str], scenes: list[str], tmp_path: Path) -> None:
+    published.middlebury(tmp_path / "set")
+    for folder in folders:
+        shutil.copytree(tmp_path / "set/trainingQ/Adirondack", tmp_path / "other" / folder)
+    found = {frame.name: frame.scene_name for frame in open_source(tmp_path / "other").frames("test")}
+    assert found == dict(zip(folders, scenes, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("key", "scene"),
+    [
+        ("train-0003-0006", "train-0003"),
+        ("test-12345-0007", "test-12345"),
+        ("000042", "000042"),
+        ("kitchen-3", "kitchen-3"),
+        ("kitchen/0003", "kitchen"),
+    ],
+)
+def test_scenes_of_shards_keys(key: str, scene: str) -> None:
+    assert scene_of(key) == scene
+
+
+def test_monkaas_folders_show_eight_worlds(tmp_path: Path) -> None:
+    published.monkaa(tmp_path)
+    more = (
+        "eating_naked_camera2_x2",
+        "lonetree_difftex2_x2",
+        "lonetree_winter_x2",
+        "funnyworld_camera2_augmented1_x2",
+    )
+    for folder in ("disparity", "frames_cleanpass"):
+        for name in more:
+            shutil.copytree(tmp_path / folder / "eating_x2", tmp_path / folder / name)
+    found = [frame.scene_name for frame in open_source(tmp_path).frames("test")]
+    assert found == ["eating", "eating", "funnyworld", "lonetree", "lonetree"]
+
+
+@pytest.mark.parametrize("name", ["flyingthings3d", "driving", "monkaa", "sintel"])
+def test_a_tree_with_the_final_pass_alone_is_read_by_it(name: str, tmp_path: Path) -> None:
+    w = SETS[name](tmp_path)
+    for clean in sorted(tmp_path.glob("**/*clean*")):
+        final = clean.with_name(clean.name.replace("clean", "final"))
+        if final.exists():
+            shutil.rmtree(final)
+        clean.rename(final)
+    source = open_source(tmp_path)
+    assert source.format.name == f"{name}-final"
+    frame = source.frames("test")[0]
+    np.testing.assert_array_equal(frame.left, w.left)
+    np.testing.assert_array_equal(frame.right, w.right)
+
+
+def test_a_set_of_ours_with_the_final_pass_alone_is_read_by_it(tmp_path: Path) -> None:
+    """What `render --passes final` leaves, and what it leaves with both passes or before the first scene is done."""
+    (tmp_path / "recipe.yaml").write_text("")
+    assert open_source(tmp_path).format.name == "native"
+    (tmp_path / "frames_finalpass").mkdir()
+    assert open_source(tmp_path).format.name == "native-final"
+    (tmp_path / "frames_cleanpass").mkdir()
+    assert open_source(tmp_path).format.name == "native"
+
+
 def test_sceneflow_errors_of_the_set_are_missing(tmp_path: Path) -> None:
     """Negative disparities among positive ones, and those beyond the image's width, mark no point."""
     w = published.monkaa(tmp_path)
@@ -115,11 +213,18 @@ def test_middlebury_2003_scales_go_with_the_resolution(width: int, scale: int, t
     assert (truth[1:] == 88 / scale).all()
 
 
-def test_kitti_names_objects(tmp_path: Path) -> None:
+def test_kitti_tells_its_cars_from_the_background(tmp_path: Path) -> None:
     w = published.kitti2015(tmp_path)
-    objects = open_source(tmp_path).frames("test")[0].object_index_left
-    assert objects is not None
-    np.testing.assert_array_equal(objects, np.where(w.disparity_left > 10, 3, 0))
+    cars = open_source(tmp_path).frames("test")[0].foreground_left
+    assert cars is not None
+    np.testing.assert_array_equal(cars, np.where(w.disparity_left > 10, 3, 0))
+
+
+def test_the_object_index_of_shards_is_no_foreground(tmp_path: Path) -> None:
+    w = published.webdataset(tmp_path)
+    frame = open_source(tmp_path).frames("train")[0]
+    np.testing.assert_array_equal(frame.object_index_left, w.disparity_left > 10)
+    assert frame.foreground_left is None
 
 
 def test_splits(tmp_path: Path) -> None:

@@ -14,7 +14,8 @@ from itertools import chain
 
 import refine.baselines
 import refine.methods
-from refine.methods.base import Method
+from refine.method import Method
+from stereoforge_kit.errors import InputError
 
 PAPER_FIRST = ("regressor", "regressor_f", "gradnet", "sgbm", "wmf", "color", "tgv", "fbs", "grad")
 PAPER_LAST = ("ours_quadratic", "ours", "ours_conf_gt")
@@ -32,7 +33,7 @@ def known_methods() -> Mapping[str, type[Method]]:
             if local and issubclass(member, Method) and not inspect.isabstract(member):
                 if member.name in methods:
                     other = methods[member.name].__module__
-                    raise ValueError(f"{found.name} and {other} both define a method {member.name!r}")
+                    raise InputError(f"{found.name} and {other} both define a method {member.name!r}")
                 methods[member.name] = member
     return methods
 
@@ -54,5 +55,5 @@ def default_methods(names: tuple[str, ...] = ()) -> tuple[Method, ...]:
     known = known_methods()
     for name in names:
         if name not in known:
-            raise ValueError(f"there is no method {name!r}; known are {', '.join(sorted(known))}")
+            raise InputError(f"there is no method {name!r}; known are {', '.join(sorted(known))}")
     return tuple(known[name]() for name in names or table_order())

@@ -1,4 +1,4 @@
-"""Which of two rectified views is the left one, by how much of them can be matched."""
+"""Tell whether two rectified views are swapped, by the share of pixels that can be matched."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CLEARLY = 1.1
 
 
 def seem_swapped(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> bool:
-    """Whether more can be matched the other way round.
+    """Whether more pixels can be matched with the views swapped.
 
     Args:
         left, right: (H, W, 3) uint8, rectified.

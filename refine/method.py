@@ -1,6 +1,6 @@
 """What an evaluation compares: frames in, disparities (or gradients) out, one class a row of the tables.
 
-`refine.methods.registry` finds the classes.
+`refine.registry` finds the classes.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from stereoforge_kit.errors import InputError
 
 INPUTS_IN_WORDS = {
     "confidence": "a confidence",
@@ -75,7 +77,7 @@ class EvaluationFrame:
             shapes[f"confidence {name!r}"] = (values.shape, size)
         for name, (got, expected) in shapes.items():
             if got != expected:
-                raise ValueError(f"frame {self.name}: {name} has shape {got}, expected {expected}")
+                raise InputError(f"frame {self.name}: {name} has shape {got}, expected {expected}")
 
 
 @dataclass(frozen=True)
@@ -125,3 +127,17 @@ class Method(ABC):
     def lacks(self, frame: EvaluationFrame) -> str:
         """The same in a reader's words, such as "a confidence and predicted gradients"; empty if it has them all."""
         return " and ".join(INPUTS_IN_WORDS[name] for name in self.missing(frame))
+
+
+def mrf_inputs(
+    method: Method, frame: EvaluationFrame
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
+    """The disparity (H, W), confidence (H, W), gradient (H, W, 2) and image (H, W, 3) of a frame.
+
+    Raises InputError if the frame lacks one of them.
+    """
+    if frame.confidence is None or frame.gradient is None:
+        raise InputError(
+            f"{method.label} needs {method.lacks(frame)}, which frame {frame.name} comes without"
+        )
+    return frame.disparity, frame.confidence, frame.gradient, frame.image
