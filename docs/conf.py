@@ -23,6 +23,7 @@ extensions = [
 ]
 exclude_patterns = ["pictures"]
 myst_heading_anchors = 3
+highlight_language = "none"  # of blocks that name none: they are of shell
 # A path in single backticks is code, and a link where it names something on these pages.
 default_role = "py:obj"
 
@@ -30,6 +31,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {"ArrayLike": "numpy.typing.ArrayLike"}
 python_use_unqualified_type_names = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
@@ -59,14 +61,18 @@ html_theme_options = {
 }
 
 
-def escape_absolute_values(
-    _app: Any, _what: str, _name: str, _of: Any, _options: Any, lines: list[str]
-) -> None:
-    """Docstrings write |x| for an absolute value, which reStructuredText takes for a substitution."""
+def read_as_prose(_app: Any, what: str, _name: str, _of: Any, _options: Any, lines: list[str]) -> None:
+    """Keep what the docstrings mean as plain text from being taken for markup, before napoleon reads them.
+
+    |x| is an absolute value here and a substitution in reStructuredText. A colon in the first line of an attribute's
+    docstring is punctuation here and ends a type in napoleon's eyes, so that line becomes an empty comment.
+    """
     for number, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
             lines[number] = re.sub(r"(`[^`]*`)|\|", lambda found: found[1] or r"\|", line)
+    if what in ("attribute", "data", "property"):
+        lines[:0] = ["..", ""]
 
 
 def setup(app: Any) -> None:
-    app.connect("autodoc-process-docstring", escape_absolute_values)
+    app.connect("autodoc-process-docstring", read_as_prose, priority=400)  # napoleon's is 500
