@@ -7,6 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
+
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))  # the packages of this checkout, whatever is installed
 
@@ -28,6 +30,7 @@ highlight_language = "none"  # of blocks that name none: they are of shell
 default_role = "py:obj"
 
 autodoc_member_order = "bysource"
+autodoc_inherit_docstrings = False  # torch's of forward says nothing of ours
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_preserve_defaults = True
@@ -74,5 +77,16 @@ def read_as_prose(_app: Any, what: str, _name: str, _of: Any, _options: Any, lin
         lines[:0] = ["..", ""]
 
 
+def name_type_aliases(_app: Any, _domain: str, _kind: str, content: nodes.Element) -> None:
+    """Write an alias in a union by its name, where Sphinx prints the object that stands for it."""
+    for text in list(content.findall(nodes.Text)):
+        named = re.sub(r"TypeAliasForwardRef\('(.*?)'\)", r"\1", text)
+        if named != text:
+            text.parent.replace(text, nodes.Text(named))
+
+
 def setup(app: Any) -> None:
     app.connect("autodoc-process-docstring", read_as_prose, priority=400)  # napoleon's is 500
+    app.connect(
+        "object-description-transform", name_type_aliases, priority=600
+    )  # autodoc's types are in by then
