@@ -23,12 +23,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from datagen.sources.registry import open_source
 from refine.evaluation.tuning import measure
+from refine.metrics import sparsification_curve
 from stereoforge.pipelines.prediction import open_predictors, open_settings
-from training.metrics import sparsification_auc
+from training.metrics import AUC_STEPS
 from training.presets import (
     SMALL_CONFNET,
     SMALL_GRADNET,
@@ -40,6 +40,7 @@ from training.presets import (
     Preset,
     RegressorPreset,
 )
+from training.runs.request import TrainingRequest
 from training.runs.train import train
 from training.runs.weights import copy_weights, has_weights
 
@@ -121,7 +122,7 @@ def confnets() -> dict[str, Preset]:
     base = SMALL_CONFNET
     return {
         **heads(base, {"dropout 0.5": 0.5, "no dropout": 0.0}),
-        "no evidence": replace(base, network=replace(base.network, evidence=False)),
+        "no cost features": replace(base, network=replace(base.network, cost_features=False)),
         **{
             f"labels within {threshold:g} px": replace(base, correct_within_px=threshold)
             for threshold in (0.5, 2.0, 3.0)
@@ -152,10 +153,19 @@ def run(task: str, name: str, preset: Preset, options: argparse.Namespace) -> No
     init = (options.regressor or options.out / "regressor" / "base") if on_regressor else None
     data = options.graded if task == "curriculum" else options.data
     began = time.perf_counter()
-    summary = train(
-        task if on_regressor else "regressor", [(data, 1.0)], folder, preset, validation=[options.data], init=init,
-        steps=steps, seed=options.seed, device="cpu", resume=True,
-    )  # fmt: skip
+    request = TrainingRequest(
+        task=task if on_regressor else "regressor",
+        data=((data, 1.0),),
+        out=folder,
+        preset=preset,
+        validation=(options.data,),
+        init=init,
+        steps=steps,
+        seed=options.seed,
+        device="cpu",
+        resume=True,
+    )
+    summary = train(request)
     row = {
         "name": name,
         "steps": steps,
@@ -177,8 +187,11 @@ def judge(run: Path, source: Path, data: Path) -> dict[str, float]:
     refined = measure(open_settings(None, source).ours, frames)
 
     def area(threshold: float) -> float:
-        maps = ((frame.confidence, frame.disparity, frame.truth) for frame in frames)
-        return float(np.mean([sparsification_auc(*map(torch.from_numpy, each), threshold) for each in maps]))
+        curves = (
+            sparsification_curve(frame.disparity, frame.truth, frame.confidence, threshold, steps=AUC_STEPS)
+            for frame in frames
+        )
+        return float(np.nanmean([curve.auc for curve in curves]))
 
     return {
         "auc at 1 px": area(1.0),

@@ -16,6 +16,7 @@ from refine.evaluation.results import mean_aucs
 from stereoforge.pipelines.prediction import open_predictors, open_settings, parameters_file
 from stereoforge.pipelines.set_evaluation import evaluate_set, open_test_data
 from training.presets import find_preset
+from training.runs.request import TrainingRequest
 from training.runs.train import train
 from training.runs.weights import has_weights
 
@@ -25,11 +26,11 @@ METHODS = ("gradnet", "ours_quadratic")
 def further(options: argparse.Namespace, name: str, refined_weight: float) -> Path:
     """The run folder of one way of training further."""
     out = Path(options.out) / f"{name}_{options.seed}"
-    train(
-        "joint",
-        [(source, 1.0) for source in options.data],
-        out,
-        find_preset("joint", options.preset),
+    request = TrainingRequest(
+        task="joint",
+        data=tuple((source, 1.0) for source in options.data),
+        out=out,
+        preset=options.preset,
         changes={"refined_weight": refined_weight},
         init=options.weights,
         refinement=open_settings(None, options.weights).ours_quadratic,
@@ -37,6 +38,7 @@ def further(options: argparse.Namespace, name: str, refined_weight: float) -> Pa
         steps=options.steps,
         seed=options.seed,
     )
+    train(request)
     if parameters_file(options.weights).exists():
         shutil.copy(parameters_file(options.weights), out)
     return out

@@ -25,17 +25,18 @@ from torch import Tensor, nn
 from torch.profiler import ProfilerActivity, profile
 
 from benchmarks.plain_dispnet import PlainDispNet
-from training.data.pipeline import Batch, StereoDataModule, open_sources
+from training.data.batch import StereoBatch
+from training.data.pipeline import StereoDataModule, open_sources
 from training.losses import multiscale_l1
 from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.presets import (
     PRESETS,
     ConfNetPreset,
     FineTuningPreset,
-    FreeConfNetPreset,
-    FreeGradNetPreset,
     GradNetPreset,
     Preset,
+    RegressorFreeConfNetPreset,
+    RegressorFreeGradNetPreset,
     RegressorPreset,
     find_preset,
 )
@@ -43,9 +44,9 @@ from training.runs.hardware import faster_layout
 from training.tasks import (
     ConfNetTask,
     FineTuningTask,
-    FreeConfNetTask,
-    FreeGradNetTask,
     GradNetTask,
+    RegressorFreeConfNetTask,
+    RegressorFreeGradNetTask,
     RegressorTask,
     StereoTask,
 )
@@ -53,16 +54,16 @@ from training.tasks import (
 Step = Callable[[], None]
 
 
-def random_batch(preset: Preset, crops: int) -> Batch:
+def random_batch(preset: Preset, crops: int) -> StereoBatch:
     """Crops of noise: what they show does not change the time."""
     size = (preset.crop_height, preset.crop_width)
     torch.manual_seed(0)
-    return {
-        "left": torch.rand(crops, 3, *size),
-        "right": torch.rand(crops, 3, *size),
-        "disparity": torch.rand(crops, 1, *size) * 60,
-        "gradient": torch.rand(crops, 2, *size) - 0.5,
-    }
+    return StereoBatch(
+        left=torch.rand(crops, 3, *size),
+        right=torch.rand(crops, 3, *size),
+        disparity=torch.rand(crops, 1, *size) * 60,
+        gradient=torch.rand(crops, 2, *size) - 0.5,
+    )
 
 
 def build_task(preset: Preset, regressor_preset: RegressorPreset) -> StereoTask:
@@ -72,20 +73,20 @@ def build_task(preset: Preset, regressor_preset: RegressorPreset) -> StereoTask:
         return RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0)
     if isinstance(preset, FineTuningPreset):
         return FineTuningTask(preset, network, preset.steps, 0)
+    if isinstance(preset, RegressorFreeConfNetPreset):
+        return RegressorFreeConfNetTask(preset, ConfNet(preset.network), preset.steps, 0)
+    if isinstance(preset, RegressorFreeGradNetPreset):
+        return RegressorFreeGradNetTask(preset, GradNet(preset.network), preset.steps, 0)
     if isinstance(preset, ConfNetPreset):
         head = ConfNet(preset.network.on(network))
         return ConfNetTask(preset, network, head, preset.steps, 0)
     if isinstance(preset, GradNetPreset):
         grad_head = GradNet(preset.network.on(network))
         return GradNetTask(preset, network, grad_head, preset.steps, 0)
-    if isinstance(preset, FreeConfNetPreset):
-        return FreeConfNetTask(preset, ConfNet(preset.network), preset.steps, 0)
-    if isinstance(preset, FreeGradNetPreset):
-        return FreeGradNetTask(preset, GradNet(preset.network), preset.steps, 0)
     raise TypeError(f"no task trains a {type(preset).__name__}")
 
 
-def our_step(task: StereoTask, batch: Batch, bf16: bool = False) -> Step:
+def our_step(task: StereoTask, batch: StereoBatch, bf16: bool = False) -> Step:
     """One iteration as `training.runs.train` runs it on a CPU."""
     faster_layout(task)
     task.train()
@@ -97,8 +98,8 @@ def our_step(task: StereoTask, batch: Batch, bf16: bool = False) -> Step:
             if isinstance(
                 task, RegressorTask
             ):  # the schedule's step comes from the trainer, which is not here
-                predictions = task.network(batch["left"], batch["right"]).disparities
-                loss = multiscale_l1(predictions, batch["disparity"], [0.2] * 5 + [1.0])
+                predictions = task.network(batch.left, batch.right).disparities
+                loss = multiscale_l1(predictions, batch.disparity, [0.2] * 5 + [1.0])
             else:
                 loss = task.loss(batch)
         optimizer.zero_grad()
@@ -110,7 +111,9 @@ def our_step(task: StereoTask, batch: Batch, bf16: bool = False) -> Step:
     return step
 
 
-def rival_step(network: nn.Module, predict: Callable[[], list[Tensor]], batch: Batch, clip: bool) -> Step:
+def rival_step(
+    network: nn.Module, predict: Callable[[], list[Tensor]], batch: StereoBatch, clip: bool
+) -> Step:
     """One iteration as one would write it down."""
     network.train()
     optimizer = torch.optim.Adam(network.parameters(), 1e-4)
@@ -119,7 +122,7 @@ def rival_step(network: nn.Module, predict: Callable[[], list[Tensor]], batch: B
         predictions = predict()
         loss = torch.zeros(())
         for prediction in predictions:
-            truth = nn.functional.adaptive_avg_pool2d(batch["disparity"], prediction.shape[-2:])
+            truth = nn.functional.adaptive_avg_pool2d(batch.disparity, prediction.shape[-2:])
             loss = loss + (prediction - truth).abs().mean()
         optimizer.zero_grad()
         loss.backward()
@@ -211,7 +214,7 @@ def compare(name: str, crops: int, rounds: int, fadnet: Path | None) -> None:
     task = RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0)
     ours = our_step(task, batch)
     plain = PlainDispNet(preset.network)
-    left, right = batch["left"], batch["right"]
+    left, right = batch.left, batch.right
     half = RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0)
     steps = {
         "ours": ours,
@@ -254,7 +257,7 @@ def measure_preset(task_name: str, name: str, crops: int, iterations: int) -> No
     wall, cpu = (time.perf_counter() - began) / iterations, (time.process_time() - cpu) / iterations
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(
-        f"{task_name:12}{name:6}{crops} x {preset.crop_width}x{preset.crop_height:<6}{1 / wall:8.2f} it/s  "
+        f"{task_name:14}{name:6}{crops} x {preset.crop_width}x{preset.crop_height:<6}{1 / wall:8.2f} it/s  "
         f"{cpu:8.3f} CPU s/it  {memory:5.2f} GiB",
         flush=True,
     )

@@ -196,11 +196,11 @@ def optimal_curve(bad_rate: float, steps: int = 200) -> SparsificationCurve:
 
 
 def optimal_auc(bad_rate: float) -> float:
-    """Area under the optimal curve for a bad rate e: e + (1 - e) ln(1 - e).
+    """Area under the optimal curve for a bad rate e: e + (1 - e) ln(1 - e); NaN for a rate of NaN.
 
     Hu and Mordohai, "A quantitative evaluation of confidence measures for stereo vision", PAMI 2012.
     """
-    if not 0 <= bad_rate <= 1:
+    if bad_rate < 0 or bad_rate > 1:
         raise InputError(f"a bad rate is between 0 and 1, got {bad_rate}")
     return 1.0 if bad_rate == 1 else float(bad_rate + (1 - bad_rate) * np.log1p(-bad_rate))
 

@@ -1,4 +1,4 @@
-"""What a user can get wrong when training or predicting."""
+"""The error that training and prediction raise for what a user can put right."""
 
 from __future__ import annotations
 

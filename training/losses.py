@@ -1,4 +1,4 @@
-"""The losses of the four tasks. NaN marks pixels without truth; they never enter a mean."""
+"""The losses of all tasks. Pixels without ground truth (NaN) never enter a mean."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
 
 ScaleWeights = tuple[float, ...]
-"""Weights of the losses at 1/64, 1/32, .. 1/2."""
+"""Weights of the losses at 1/64, 1/32, ..., 1/2 of the resolution."""
 
 STAGE_WEIGHTS: tuple[ScaleWeights, ...] = (
     (1.0, 0.2, 0.0, 0.0, 0.0, 0.0),
@@ -20,21 +20,22 @@ STAGE_WEIGHTS: tuple[ScaleWeights, ...] = (
     (0.0, 0.0, 0.0, 0.0, 0.5, 1.0),
     (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
 )
-"""One row a stage, from coarse to fine: DispNet's training schedule as its authors gave it."""
+"""One row per stage, from coarse to fine: DispNet's training schedule as its authors gave it."""
 
 STATIC_WEIGHTS: ScaleWeights = (0.2, 0.2, 0.2, 0.2, 0.2, 1.0)
-"""The weights in DispNet's released training definition, which started from trained weights."""
+"""The weights in DispNet's released training definition, which continues from trained weights."""
 
 
 def stage_weights(step: int, stages: Sequence[ScaleWeights], ends: Sequence[int]) -> ScaleWeights:
-    """The weights in force at a step.
+    """The weights that apply at a step.
 
     Args:
-        stages: the weights of each stage.
-        ends: step at which each stage but the last ends, not decreasing.
+        step: Number of the step, from 0.
+        stages: The weights of each stage.
+        ends: The step at which each stage but the last ends, not decreasing.
 
     Raises:
-        ValueError: the numbers of stages and ends do not fit.
+        ValueError: there is not one end fewer than stages.
     """
     if len(ends) != len(stages) - 1:
         raise ValueError(f"{len(stages)} loss stages need {len(stages) - 1} ends, got {tuple(ends)}")
@@ -42,10 +43,14 @@ def stage_weights(step: int, stages: Sequence[ScaleWeights], ends: Sequence[int]
 
 
 def masked_mean(values: Tensor, mask: Tensor) -> Tensor:
-    """Mean of `values` where `mask`; 0 (with a gradient of 0) where the mask is empty.
+    """Mean of `values` where `mask` is true; 0 (with a gradient of 0) if the mask is empty.
 
-    With several processes, a process's sum over the mean count of all of them: averaged over the processes, as
-    their gradients are, that is the mean over all their pixels, however unevenly the valid ones fall.
+    Under torchrun a process divides its sum by the mean count of all processes. Averaged over the processes, as their
+    gradients are, this is the mean over all their pixels, however unevenly the valid ones are distributed.
+
+    Args:
+        values: Any shape; NaN outside the mask does no harm.
+        mask: bool, of the same shape.
     """
     count = mask.sum()
     if torch.distributed.is_available() and torch.distributed.is_initialized():
@@ -56,13 +61,13 @@ def masked_mean(values: Tensor, mask: Tensor) -> Tensor:
 
 
 def downsample_disparity(truth: Tensor, size: tuple[int, int]) -> Tensor:
-    """Average a disparity over each coarse pixel's area, over valid pixels only.
+    """Average a ground-truth disparity over the area of each coarse pixel.
 
-    Values stay in pixels of the full resolution.
+    The values stay in pixels of the full resolution. Only valid pixels are averaged over.
 
     Args:
         truth: (B, 1, H, W), NaN invalid.
-        size: (h, w), each dividing H and W.
+        size: (h, w), which divide H and W.
 
     Returns:
         (B, 1, h, w), NaN where no pixel of the area is valid.
@@ -75,17 +80,24 @@ def downsample_disparity(truth: Tensor, size: tuple[int, int]) -> Tensor:
 
 
 def disparity_l1(prediction: Tensor, truth: Tensor) -> Tensor:
-    """Mean |relu(prediction) - truth| over valid pixels; disparity is never negative."""
+    """Mean |relu(prediction) - truth| over valid pixels; disparity is never negative.
+
+    Args:
+        prediction: (B, 1, H, W) px.
+        truth: (B, 1, H, W) px, NaN invalid.
+    """
     return masked_mean((F.relu(prediction) - truth).abs(), ~torch.isnan(truth))
 
 
 def multiscale_l1(predictions: Sequence[Tensor], truth: Tensor, weights: Sequence[float]) -> Tensor:
-    """Weighted sum of `disparity_l1` over the scales, each against the truth averaged down to it.
+    """Weighted sum of `disparity_l1` over the scales (Mayer et al. 2016).
+
+    Each prediction is compared with the ground truth averaged down to its scale.
 
     Args:
         predictions: (B, 1, h, w) each, in pixels of the full resolution.
         truth: (B, 1, H, W), NaN invalid.
-        weights: one a prediction; scales of weight 0 cost nothing.
+        weights: One per prediction. Scales of weight 0 are not computed.
     """
     losses = [
         weight
@@ -97,10 +109,13 @@ def multiscale_l1(predictions: Sequence[Tensor], truth: Tensor, weights: Sequenc
 
 
 def gradient_aware_l1(prediction: Tensor, truth: Tensor, gradient_weight: float) -> Tensor:
-    """Eq. 9: mean |l| + lambda mean(|dx l| + |dy l|), l = prediction - truth, by forward differences.
+    """Eq. 9 of the paper: mean |l| + lambda mean(|dx l| + |dy l|) with l = prediction - truth.
+
+    dx and dy are forward differences; one counts where both its pixels are valid.
 
     Args:
-        prediction, truth: (B, 1, H, W); a difference counts where both its pixels are valid.
+        prediction: (B, 1, H, W) px.
+        truth: (B, 1, H, W) px, NaN invalid.
         gradient_weight: lambda, 5 in the paper.
     """
     error = F.relu(prediction) - truth
@@ -115,12 +130,12 @@ def gradient_aware_l1(prediction: Tensor, truth: Tensor, gradient_weight: float)
 def confidence_cross_entropy(
     logits: Tensor, disparity: Tensor, truth: Tensor, correct_within_px: float
 ) -> Tensor:
-    """Cross-entropy of (wrong, correct) against the label |d - d*| <= t, over valid pixels.
+    """ConfNet's loss: cross-entropy of (wrong, correct) against the label |d - d*| <= t, over valid pixels.
 
     Args:
         logits: (B, 2, H, W).
-        disparity: (B, 1, H, W), the regressor's.
-        truth: (B, 1, H, W), NaN invalid.
+        disparity: (B, 1, H, W) px, the estimate that is judged.
+        truth: (B, 1, H, W) px, NaN invalid.
         correct_within_px: t.
     """
     error = (disparity - truth).abs()
@@ -131,11 +146,12 @@ def confidence_cross_entropy(
 def refinement_l1(
     refined: Tensor, truth: Tensor, gradient: Tensor, gradient_weight: float, threshold_px: float
 ) -> Tensor:
-    """Mean |d - d*| of a refined disparity, and so many times `masked_gradient_l1` of its forward differences (ours).
+    """Mean |d - d*| of a refined disparity plus the weighted `masked_gradient_l1` of its forward differences (ours).
 
     Args:
-        refined, truth: (B, 1, H, W), NaN in `truth` where there is none.
-        gradient: (B, 2, H, W) forward differences of the truth, NaN where there is none.
+        refined: (B, 1, H, W) px.
+        truth: (B, 1, H, W) px, NaN invalid.
+        gradient: (B, 2, H, W) forward differences of the ground truth, NaN invalid.
         gradient_weight: As lambda in eq. 9.
         threshold_px: Larger true differences are discontinuities.
     """
@@ -149,15 +165,15 @@ def refinement_l1(
 
 
 def masked_gradient_l1(prediction: Tensor, gradient: Tensor, threshold_px: float) -> Tensor:
-    """Mean over unmasked pixels of |gx - gx*| + |gy - gy*|.
+    """GradNet's loss: mean of |gx - gx*| + |gy - gy*| over smooth pixels.
 
-    A pixel is masked where a difference is missing or larger than the threshold: there is a discontinuity, not
-    a surface.
+    A pixel is left out where a true difference is missing or above the threshold: there is a discontinuity, not a
+    surface.
 
     Args:
-        prediction: (B, 2, H, W).
-        gradient: (B, 2, H, W) forward differences of the truth, NaN where there is none.
-        threshold_px: 1 in the paper as far as it can be read.
+        prediction: (B, 2, H, W) px per px.
+        gradient: (B, 2, H, W) forward differences of the ground truth, NaN invalid.
+        threshold_px: 1 in the paper, as far as the digit can be read.
     """
     mask = (gradient.abs() <= threshold_px).all(dim=1)  # NaN compares false
     return masked_mean((prediction - gradient).abs().sum(dim=1), mask)

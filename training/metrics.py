@@ -1,58 +1,86 @@
-"""Validation figures. Every function gives NaN where no pixel counts."""
+"""Validation figures of tensors, as `refine.metrics` measures them.
+
+Which pixels count is said there and nowhere else: ground truth that is NaN leaves a pixel out, an empty mask gives NaN,
+and an estimate that is NaN is bad in every rate and left out of every mean. The functions here only bring tensors into
+the shape that those take; all images of a batch are pooled. A validation leaves frames whose figure is NaN for want of
+ground truth out of its mean (`StereoTask.validation_step`).
+"""
 
 from __future__ import annotations
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
-BAD_PX = 1.0
+from refine import metrics
+
 AUC_STEPS = 20
+"""Steps of the sparsification curve: few, since the curve is measured for every validation frame."""
 
 
-def end_point_error(disparity: Tensor, truth: Tensor) -> Tensor:
-    """Mean |d - d*| over valid pixels."""
-    return (disparity - truth).abs().nanmean()
-
-
-def bad_rate(disparity: Tensor, truth: Tensor, threshold_px: float = BAD_PX) -> Tensor:
-    """Share of valid pixels with |d - d*| > threshold."""
-    error = (disparity - truth).abs()
-    return (error[~torch.isnan(error)] > threshold_px).float().mean()
-
-
-def gradient_error(gradient: Tensor, truth: Tensor, threshold_px: float) -> Tensor:
-    """Mean |gx - gx*| + |gy - gy*| over pixels whose true differences exist and are not above the threshold.
+def end_point_error(disparity: Tensor, truth: Tensor) -> float:
+    """Mean |d - d*| in pixels (`refine.metrics.end_point_error`).
 
     Args:
-        gradient, truth: (B, 2, H, W), NaN in `truth` where there is none.
+        disparity: (B, 1, H, W) px.
+        truth: (B, 1, H, W) px, NaN where unknown.
     """
-    mask = (truth.abs() <= threshold_px).all(dim=1)
-    return (gradient - truth).abs().sum(dim=1)[mask].mean()
+    return metrics.end_point_error(_as_map(disparity), _as_map(truth))
 
 
-def forward_differences(disparity: Tensor) -> Tensor:
-    """(B, 1, H, W) to (B, 2, H, W), [dx, dy]; NaN in the last column and row."""
-    gradient = torch.full_like(disparity.repeat(1, 2, 1, 1), torch.nan)
-    gradient[:, 0, :, :-1] = disparity[:, 0, :, 1:] - disparity[:, 0, :, :-1]
-    gradient[:, 1, :-1, :] = disparity[:, 0, 1:, :] - disparity[:, 0, :-1, :]
-    return gradient
+def bad_pixel_rate(disparity: Tensor, truth: Tensor, threshold_px: float = 1.0) -> float:
+    """Share (0..1) of pixels with |d - d*| above the threshold (`refine.metrics.bad_pixel_rate`).
+
+    Arguments as for `end_point_error`.
+    """
+    return metrics.bad_pixel_rate(_as_map(disparity), _as_map(truth), threshold_px)
+
+
+def gradient_error(gradient: Tensor, truth: Tensor, threshold_px: float) -> float:
+    """Mean |gx - gx*| plus mean |gy - gy*| on smooth pixels, px per px (`refine.metrics.gradient_error`).
+
+    Args:
+        gradient: (B, 2, H, W) as [dx, dy].
+        truth: (B, 2, H, W), NaN where unknown.
+        threshold_px: Pixels with a larger true difference are discontinuities (`refine.metrics.smooth_mask`).
+    """
+    expected = _as_gradient(truth)
+    return metrics.gradient_error(
+        _as_gradient(gradient), expected, metrics.smooth_mask(expected, threshold_px)
+    )
+
+
+def forward_gradient(disparity: Tensor) -> Tensor:
+    """Forward differences [dx, dy] of (B, 1, H, W), as (B, 2, H, W); NaN where a pixel has no neighbour."""
+    maps = [metrics.forward_gradient(each[0]) for each in disparity.float().cpu().numpy()]
+    return torch.from_numpy(np.stack(maps)).permute(0, 3, 1, 2).to(disparity)
 
 
 def sparsification_auc(
-    confidence: Tensor, disparity: Tensor, truth: Tensor, threshold_px: float = BAD_PX
-) -> Tensor:
-    """Area under bad rate of the kept pixels against the share removed, least confident first (trapezoids)."""
-    error = (disparity - truth).abs().flatten()
-    valid = ~torch.isnan(error)
-    bad = (error[valid] > threshold_px).double()
-    bad = bad[torch.argsort(confidence.flatten()[valid], descending=True, stable=True)]
-    removed = torch.arange(AUC_STEPS, dtype=torch.float64, device=bad.device) / AUC_STEPS
-    kept = (bad.numel() * (1 - removed)).round().long().clamp(min=1)
-    rates = bad.cumsum(0)[kept - 1] / kept
-    return torch.trapezoid(torch.cat([rates, rates[-1:]]), dx=1 / AUC_STEPS).float()
+    confidence: Tensor, disparity: Tensor, truth: Tensor, threshold_px: float = 1.0
+) -> float:
+    """Area under the bad-pixel rate of the pixels kept, against the share removed, least confident first.
+
+    By `refine.metrics.sparsification_curve`, where a random order of equally confident pixels is averaged over.
+
+    Args:
+        confidence: (B, 1, H, W), higher is surer.
+        disparity, truth: As for `end_point_error`.
+        threshold_px: Larger errors are bad.
+    """
+    return metrics.sparsification_curve(
+        _as_map(disparity), _as_map(truth), _as_map(confidence), threshold_px, steps=AUC_STEPS
+    ).auc
 
 
-def optimal_auc(rate: Tensor) -> Tensor:
-    """The least possible area for a bad rate e: e + (1 - e) ln(1 - e) (Hu & Mordohai 2012)."""
-    missed: Tensor = torch.special.xlog1py(1 - rate, -rate)
-    return rate + missed
+def _as_map(maps: Tensor) -> NDArray[np.float32]:
+    """(B, 1, H, W) as one map of (B * H, W)."""
+    batch, _, height, width = maps.shape
+    return maps.float().cpu().numpy().reshape(batch * height, width)
+
+
+def _as_gradient(maps: Tensor) -> NDArray[np.float32]:
+    """(B, 2, H, W) as one map of (B * H, W, 2)."""
+    batch, _, height, width = maps.shape
+    return maps.float().permute(0, 2, 3, 1).cpu().numpy().reshape(batch * height, width, 2)

@@ -1,13 +1,17 @@
 """All numbers of all training runs, in one place.
 
-`full` is the published training: METHOD's DispNetCorr1D, ConfNet and GradNet. `small` (about 2.7 million
-parameters, a 11 MB file) and `tiny` (for minutes on a laptop's CPU) change what short runs on few pairs need
-changed, all of it here: BatchNorm (its statistics fixed towards the end of a regressor's run), a one-sided
-correlation, predictions in units of 16 px, a larger learning rate with warm-up and a cosine end, gradient clipping, a
-compressed loss schedule, milder colour changes, flips, heads that work at the features' half resolution and also see
-matching costs around the disparity, how the disparity lies in its surroundings and, for GradNet, their slopes
-(`training.networks.cost_features`), since the features of a small regressor hold too little of these; and, in `small`,
-some of the heads' crops are sheared into slants, and GradNet looks further around (dilations; docs/ablations.md).
+`full` is the published training of DispNetCorr1D, ConfNet and GradNet. `small` (about 2.7 million parameters, a 11 MB
+file) and `tiny` (minutes on a laptop's CPU) differ from it where short runs on few pairs need it (ours):
+
+- BatchNorm, with fixed statistics towards the end of a regressor's run;
+- a one-sided correlation, and predictions in units of 16 px;
+- a larger learning rate with warm-up and cosine decay, and gradient clipping;
+- one stage of loss weights instead of seven;
+- milder colour changes, and flips;
+- heads that work at half resolution;
+- heads that take cost features too (`training.networks.cost_features`), since a small regressor's matching features
+  hold too little of them;
+- in `small`, sheared crops for the heads and larger dilations in GradNet (docs/ablations.md).
 """
 
 from __future__ import annotations
@@ -18,61 +22,59 @@ from typing import Any, Literal, get_args
 
 from stereoforge_kit.matching import SGBMParameters
 from training.data.augmentation import AugmentationConfig
+from training.data.sampling import SamplingConfig
 from training.errors import TrainingError
 from training.losses import STAGE_WEIGHTS, STATIC_WEIGHTS, ScaleWeights
 from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
+from training.networks.regressor_free import REGRESSOR_FREE_CHANNELS
 from training.networks.regressors.dispnet import STRIDE
-from training.prediction.regressor_free import FREE_FEATURES
 
 Task = Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free", "joint"]
+"""Names of the tasks, on the command line and in the names of files."""
 TASKS: tuple[Task, ...] = get_args(Task)
+"""All of them."""
 
 
 @dataclass(frozen=True)
 class OptimizerConfig:
-    """Adam and its learning rate's course. Steps are those of the preset; a run of another length scales them."""
+    """Adam and the schedule of its learning rate.
+
+    Steps are those of the preset; a run of another length scales them.
+    """
 
     learning_rate: float = 1e-4
+    """The largest rate, after the warm-up."""
     schedule: Literal["halving", "cosine"] = "halving"
     """`halving` halves the rate at each of `halve_at`; `cosine` brings it to zero at the end."""
     halve_at: tuple[int, ...] = ()
+    """Steps at which the schedule `halving` halves the rate."""
     warmup_steps: int = 0
-    """The rate grows linearly over these."""
+    """Steps over which the rate grows linearly, from the first."""
     betas: tuple[float, float] = (0.9, 0.999)
+    """Adam's beta 1 and beta 2."""
     epsilon: float = 1e-4
+    """Adam's epsilon."""
     weight_decay: float = 0.0
-    """L2 penalty: of the contracting part's convolution weights in a regressor, of all weights in a head."""
+    """L2 penalty, in a regressor on the weights of the encoder's convolutions, in a head on all parameters."""
     clip_norm: float | None = None
-    """Largest norm of the gradient; None does not clip."""
+    """Norm at which the gradient is clipped; None does not clip."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Preset:
+class Preset(SamplingConfig):
     """What every training run has."""
 
     steps: int
     """Optimizer steps."""
-    batch_size: int
-    """Crops a step (and a process)."""
-    crop_width: int
-    crop_height: int
-    """Size of the crops in pixels, multiples of 64."""
     optimizer: OptimizerConfig
-    augmentation: AugmentationConfig = field(default_factory=AugmentationConfig)
-    validation_interval: int = 1000
-    """Steps between validations, each of which writes a checkpoint."""
-    validation_samples: int = 50
-    """Validation frames looked at, evenly spread over the split."""
+    """Adam and its learning rate."""
     ema_decay: float | None = None
-    """Validate and keep an exponential moving average of the weights with this decay a step; None keeps the weights
-    themselves."""
-    curriculum: float = 0.0
-    """Share of the run over which the crops come from a growing first part of every data set, in its own order, so that
-    one rendered from simple to complex is seen that way; 0 draws from all from the beginning (ours)."""
+    """Decay per step of an exponential moving average of the weights, which is then what is validated and kept; None
+    keeps the weights themselves."""
     fixed_statistics: float = 0.0
-    """Share of the run, its last, over which BatchNorm normalises by fixed statistics, as it does on frames, and the
-    weights get used to them: 0 leaves every batch its own to the end, 1 keeps those of the network that the run starts
-    from (ours)."""
+    """Share of the run, at its end, over which BatchNorm normalises by fixed statistics, as it does in prediction, so
+    that the weights adapt to them (ours). 0 normalises every batch by its own statistics to the end; 1 keeps the
+    statistics of the network that the run starts from."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,17 +82,19 @@ class RegressorPreset(Preset):
     """DispNetCorr1D from scratch."""
 
     network: DispNetConfig = field(default_factory=DispNetConfig)
+    """Options of the network."""
     loss_stages: tuple[ScaleWeights, ...] = STAGE_WEIGHTS
-    """Weights of the six scales' losses, one row a stage."""
+    """Weights of the six scales' losses, one row per stage."""
     stage_ends: tuple[int, ...]
-    """Step at which each stage but the last ends."""
+    """The step at which each stage but the last ends."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FineTuningPreset(Preset):
-    """`regressor_f`: a trained regressor tuned with eq. 9; the network is the regressor's.
+    """`regressor_f`: a trained regressor, fine-tuned with eq. 9.
 
-    No zoom: eq. 9 takes differences of the truth, which nearest sampling would turn into stairs.
+    Its presets do not zoom, since eq. 9 takes differences of the ground truth, and a zoomed map of nearest pixels has
+    steps.
     """
 
     gradient_weight: float = 5.0
@@ -102,9 +106,9 @@ class ConfNetPreset(Preset):
     """ConfNet on a frozen regressor."""
 
     network: HeadConfig = field(default_factory=HeadConfig)
-    """The feature channels are taken from the regressor."""
+    """Options of the network; the number of feature channels is taken from the regressor."""
     correct_within_px: float = 1.0
-    """t: a disparity this close to the truth is correct. The paper does not give it; 3 is KITTI's convention."""
+    """t: a disparity this close to the ground truth is correct. The paper does not give it; KITTI's convention is 3."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,45 +116,47 @@ class GradNetPreset(Preset):
     """GradNet on a frozen regressor."""
 
     network: HeadConfig = field(default_factory=lambda: PUBLISHED_GRADNET)
+    """Options of the network; the number of feature channels is taken from the regressor."""
     gradient_threshold_px: float = 1.0
-    """Larger forward differences are discontinuities and masked out. One digit in the paper, most likely 1."""
+    """Pixels with larger forward differences are discontinuities and left out. The paper gives one digit, most likely
+    1."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreeConfNetPreset(ConfNetPreset):
+class RegressorFreeConfNetPreset(ConfNetPreset):
     """ConfNet on the disparity of semi-global matching, without a regressor (ours)."""
 
     matcher: SGBMParameters = field(default_factory=SGBMParameters)
-    """Matches every crop and every validation frame as the run goes."""
+    """Options of the matcher, which matches every crop and every validation frame during the run."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreeGradNetPreset(GradNetPreset):
+class RegressorFreeGradNetPreset(GradNetPreset):
     """GradNet on the disparity of semi-global matching, without a regressor (ours)."""
 
     matcher: SGBMParameters = field(default_factory=SGBMParameters)
-    """Matches every crop and every validation frame as the run goes."""
+    """Options of the matcher, which matches every crop and every validation frame during the run."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointPreset(Preset):
-    """ConfNet and GradNet trained further through the refinement (ours); the networks are a run folder's.
+    """ConfNet and GradNet of a run folder, trained further through the refinement (ours).
 
-    Colours stay as they are: the refinement reads edges off the image in absolute units, and noise would put one
-    between any two pixels.
+    Its presets leave the colours as they are. The refinement finds edges in the image in absolute units, and noise
+    would put one between any two pixels.
     """
 
     refined_weight: float = 0.2
-    """Weight of the refined disparity's loss beside the heads' own, cross-entropy and gradient L1, whose weight is 1;
-    0 trains the heads on their own losses alone."""
+    """Weight of the refined disparity's loss. The heads' own losses, cross-entropy and gradient L1, have weight 1; 0
+    trains the heads on these alone."""
     refined_gradient_weight: float = 5.0
     """Weight of the refined disparity's gradient error beside its error in pixels."""
     correct_within_px: float = 1.0
-    """As for ConfNet."""
+    """As in `ConfNetPreset`."""
     gradient_threshold_px: float = 1.0
-    """As for GradNet, and for the refined disparity's gradient."""
+    """As in `GradNetPreset`; also for the refined disparity's gradient."""
     tolerance: float = 1e-4
-    """Relative residual of the solves, forwards and backwards."""
+    """Relative residual at which the linear solves of the forward and the backward pass stop."""
 
 
 def _every(interval: int, end: int) -> tuple[int, ...]:
@@ -167,15 +173,16 @@ SMALL_AUGMENTATION = AugmentationConfig(
     log_color=0.1,
     noise=0.02,
 )
-"""About half of the released ranges: a small network in a short run fits narrower data better (ours)."""
+"""About half of the released ranges, since a small network in a short run fits narrower data better (ours)."""
 
 SLANTED_AUGMENTATION = replace(SMALL_AUGMENTATION, shear=0.6)
-"""For heads: some crops sheared, as roads are and nothing that flies is. A run of 200 steps (`tiny`) has no time for
-slants and goes without (docs/ablations.md)."""
+"""For heads: some crops are sheared, since roads are slanted and flying things are not. A run of 200 steps (`tiny`) is
+too short to learn from it (docs/ablations.md)."""
 
 SMALL_OPTIMIZER = OptimizerConfig(
     learning_rate=1e-3, schedule="cosine", warmup_steps=500, epsilon=1e-8, weight_decay=1e-4, clip_norm=1.0
 )
+"""Adam of the short runs (ours)."""
 
 FULL_REGRESSOR = RegressorPreset(
     steps=1_200_000,
@@ -186,7 +193,8 @@ FULL_REGRESSOR = RegressorPreset(
     stage_ends=(100_000, 200_000, 300_000, 400_000, 500_000, 600_000),
     validation_interval=10_000,
 )
-"""The stage lengths are not published; 100,000 steps each is what a public retraining used (ours)."""
+"""The published training. The lengths of the stages are not published; 100,000 steps each is what a public retraining
+used (ours)."""
 
 SMALL_REGRESSOR = RegressorPreset(
     steps=20_000,
@@ -201,6 +209,7 @@ SMALL_REGRESSOR = RegressorPreset(
     validation_interval=500,
     fixed_statistics=0.3,
 )
+"""For hours on few pairs (ours)."""
 TINY_REGRESSOR = replace(
     SMALL_REGRESSOR,
     steps=800,
@@ -208,7 +217,7 @@ TINY_REGRESSOR = replace(
     validation_interval=200,
     validation_samples=16,
 )
-"""At twice the rate so short a run gets 8 to 9 % further (docs/ablations.md)."""
+"""At twice the learning rate of `small`, so short a run has errors lower by 8 to 9 % (docs/ablations.md)."""
 
 FULL_FINE_TUNING = FineTuningPreset(
     steps=100_000,
@@ -219,7 +228,7 @@ FULL_FINE_TUNING = FineTuningPreset(
     augmentation=AugmentationConfig(log_zoom=(0.0, 0.0), log_squeeze=(0.0, 0.0)),
     validation_interval=5000,
 )
-"""Length and learning rate of the fine-tuning are not published (ours)."""
+"""The paper's fine-tuning; its length and learning rate are not published (ours)."""
 SMALL_FINE_TUNING = FineTuningPreset(
     steps=3000,
     batch_size=4,
@@ -230,6 +239,7 @@ SMALL_FINE_TUNING = FineTuningPreset(
     validation_interval=500,
     fixed_statistics=1.0,
 )
+"""`regressor_f` for about an hour (ours)."""
 TINY_FINE_TUNING = replace(
     SMALL_FINE_TUNING,
     steps=200,
@@ -237,6 +247,7 @@ TINY_FINE_TUNING = replace(
     validation_interval=100,
     validation_samples=16,
 )
+"""`regressor_f` for minutes (ours)."""
 
 FULL_CONFNET = ConfNetPreset(
     steps=320_000,
@@ -248,6 +259,7 @@ FULL_CONFNET = ConfNetPreset(
     ),
     validation_interval=10_000,
 )
+"""The paper's training of ConfNet."""
 SMALL_CONFNET = ConfNetPreset(
     steps=5000,
     batch_size=4,
@@ -261,10 +273,11 @@ SMALL_CONFNET = ConfNetPreset(
         dropout=0.2,
         normalization="batch",
         half_resolution=True,
-        evidence=True,
+        cost_features=True,
     ),
     validation_interval=500,
 )
+"""ConfNet on a small regressor (ours)."""
 TINY_CONFNET = replace(
     SMALL_CONFNET,
     steps=200,
@@ -273,6 +286,7 @@ TINY_CONFNET = replace(
     validation_interval=100,
     validation_samples=16,
 )
+"""ConfNet for minutes (ours)."""
 
 FULL_GRADNET = GradNetPreset(
     steps=200_000,
@@ -284,9 +298,10 @@ FULL_GRADNET = GradNetPreset(
     ),
     validation_interval=10_000,
 )
+"""The paper's training of GradNet."""
 WIDE_DILATIONS = (1, 2, 4, 8)
-"""With half resolution a reach of 30 pixels to every side, which slopes of other worlds want and probabilities do not
-(docs/ablations.md)."""
+"""At half resolution they reach 30 pixels in every direction. Gradients on other worlds gain from that, confidences do
+not (docs/ablations.md)."""
 SMALL_GRADNET = GradNetPreset(
     steps=5000,
     batch_size=4,
@@ -297,6 +312,7 @@ SMALL_GRADNET = GradNetPreset(
     network=replace(SMALL_CONFNET.network, dropout=0.0, dilations=WIDE_DILATIONS),
     validation_interval=500,
 )
+"""GradNet on a small regressor (ours)."""
 TINY_GRADNET = replace(
     SMALL_GRADNET,
     steps=200,
@@ -306,44 +322,50 @@ TINY_GRADNET = replace(
     validation_interval=100,
     validation_samples=16,
 )
-"""So short a run learns more where it looks next to a pixel than further around (docs/ablations.md)."""
+"""So short a run learns more from a pixel's neighbours than from its wider surroundings (docs/ablations.md)."""
 
-SMALL_FREE_CONFNET = FreeConfNetPreset(
+SMALL_REGRESSOR_FREE_CONFNET = RegressorFreeConfNetPreset(
     steps=SMALL_CONFNET.steps,
     batch_size=4,
     crop_width=320,
     crop_height=128,
     optimizer=SMALL_CONFNET.optimizer,
     augmentation=SLANTED_AUGMENTATION,
-    network=replace(SMALL_CONFNET.network, feature_channels=FREE_FEATURES, dilations=WIDE_DILATIONS),
+    network=replace(
+        SMALL_CONFNET.network, feature_channels=REGRESSOR_FREE_CHANNELS, dilations=WIDE_DILATIONS
+    ),
     validation_interval=500,
 )
-TINY_FREE_CONFNET = replace(
-    SMALL_FREE_CONFNET,
+"""`confnet_free`: `small`, on semi-global matching (ours)."""
+TINY_REGRESSOR_FREE_CONFNET = replace(
+    SMALL_REGRESSOR_FREE_CONFNET,
     steps=200,
     augmentation=SMALL_AUGMENTATION,
     optimizer=TINY_CONFNET.optimizer,
     validation_interval=100,
     validation_samples=16,
 )
-SMALL_FREE_GRADNET = FreeGradNetPreset(
+"""`confnet_free` for minutes (ours)."""
+SMALL_REGRESSOR_FREE_GRADNET = RegressorFreeGradNetPreset(
     steps=SMALL_GRADNET.steps,
     batch_size=4,
     crop_width=320,
     crop_height=128,
     optimizer=SMALL_GRADNET.optimizer,
     augmentation=SLANTED_AUGMENTATION,
-    network=replace(SMALL_GRADNET.network, feature_channels=FREE_FEATURES),
+    network=replace(SMALL_GRADNET.network, feature_channels=REGRESSOR_FREE_CHANNELS),
     validation_interval=500,
 )
-TINY_FREE_GRADNET = replace(
-    SMALL_FREE_GRADNET,
+"""`gradnet_free`: `small`, on semi-global matching (ours)."""
+TINY_REGRESSOR_FREE_GRADNET = replace(
+    SMALL_REGRESSOR_FREE_GRADNET,
     steps=200,
     augmentation=SMALL_AUGMENTATION,
     optimizer=TINY_GRADNET.optimizer,
     validation_interval=100,
     validation_samples=16,
 )
+"""`gradnet_free` for minutes (ours)."""
 
 SMALL_JOINT = JointPreset(
     steps=2000,
@@ -356,6 +378,7 @@ SMALL_JOINT = JointPreset(
     ),
     validation_interval=250,
 )
+"""Both heads through the refinement (ours)."""
 TINY_JOINT = replace(
     SMALL_JOINT,
     steps=200,
@@ -365,20 +388,26 @@ TINY_JOINT = replace(
     validation_interval=50,
     validation_samples=16,
 )
+"""Both heads through the refinement, for minutes (ours)."""
 
 PRESETS: dict[Task, dict[str, Preset]] = {
     "regressor": {"tiny": TINY_REGRESSOR, "small": SMALL_REGRESSOR, "full": FULL_REGRESSOR},
     "regressor_f": {"tiny": TINY_FINE_TUNING, "small": SMALL_FINE_TUNING, "full": FULL_FINE_TUNING},
     "confnet": {"tiny": TINY_CONFNET, "small": SMALL_CONFNET, "full": FULL_CONFNET},
     "gradnet": {"tiny": TINY_GRADNET, "small": SMALL_GRADNET, "full": FULL_GRADNET},
-    "confnet_free": {"tiny": TINY_FREE_CONFNET, "small": SMALL_FREE_CONFNET},
-    "gradnet_free": {"tiny": TINY_FREE_GRADNET, "small": SMALL_FREE_GRADNET},
+    "confnet_free": {"tiny": TINY_REGRESSOR_FREE_CONFNET, "small": SMALL_REGRESSOR_FREE_CONFNET},
+    "gradnet_free": {"tiny": TINY_REGRESSOR_FREE_GRADNET, "small": SMALL_REGRESSOR_FREE_GRADNET},
     "joint": {"tiny": TINY_JOINT, "small": SMALL_JOINT},
 }
+"""The presets of each task by their names."""
 
 
 def find_preset(task: str, name: str) -> Preset:
-    """The preset of a task by its name. Raises TrainingError, listing what there is."""
+    """Find the preset of a task by its name.
+
+    Raises:
+        TrainingError: no such task or preset; lists those that there are.
+    """
     for known, presets in PRESETS.items():
         if known == task:
             if name not in presets:
@@ -388,7 +417,11 @@ def find_preset(task: str, name: str) -> Preset:
 
 
 def change_preset(preset: Preset, changes: Mapping[str, Any]) -> Preset:
-    """The preset with other values of some of its fields. Raises TrainingError for one it does not have."""
+    """Change some fields of a preset.
+
+    Raises:
+        TrainingError: a field that the preset does not have, or a crop size that is no multiple of 64.
+    """
     known = [field.name for field in fields(preset)]
     for name in changes:
         if name not in known:
@@ -396,8 +429,8 @@ def change_preset(preset: Preset, changes: Mapping[str, Any]) -> Preset:
                 f"{name} does not apply here: a {type(preset).__name__} has {', '.join(known)}"
             )
     changed = replace(preset, **changes)
-    sides = changed.crop_width, changed.crop_height
-    if any(side % STRIDE for side in sides) or min(sides) < STRIDE:
+    size = changed.crop_width, changed.crop_height
+    if any(length % STRIDE for length in size) or min(size) < STRIDE:
         raise TrainingError(
             f"crops must be multiples of {STRIDE} each way, not {changed.crop_width}x{changed.crop_height}"
         )

@@ -37,10 +37,10 @@ class Train:
         ],
         shown("TASK"),
     ]
-    """regressor (DispNetCorr1D), regressor_f (fine-tuned on gradients too), confnet or gradnet; confnet_free and
-    gradnet_free need no regressor: they learn from semi-global matching and serve any disparity. rdf: a
-    random forest as ConfNet's rival. joint: trains confnet and gradnet of --init further, through the refinement,
-    into another run folder."""
+    """regressor: DispNetCorr1D. regressor_f: a regressor fine-tuned on gradients too. confnet, gradnet: the heads on a
+    regressor. confnet_free, gradnet_free: regressor-free heads, trained on semi-global matching, for the disparity of
+    any predictor. rdf: a random forest, the rival of ConfNet. joint: trains confnet and gradnet of --init further,
+    through the refinement, into another run folder."""
     data: Annotated[tuple[str, ...], several("DATA[:WEIGHT]")]
     """Data sets, each with how often it is drawn from relative to the others (default 1): folders or URLs, with
     FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
@@ -59,7 +59,7 @@ class Train:
     curriculum: Annotated[float, shown("SHARE")] = 0.0
     """Share of the run over which the crops come from a growing first part of every data set, for those rendered from
     simple to complex (render --curriculum)."""
-    pseudo: Annotated[Path | None, shown("DIR", "none")] = None
+    pseudo_labels: Annotated[Path | None, shown("DIR", "none")] = None
     """Folder of disparities to train on instead of the data set's ground truth: <frame name>.pfm or KITTI-like .png."""
     init: Annotated[Path | None, shown("RUN", "none")] = None
     """Run folder of the regressor to start from or to build on; for joint, of all three networks and, where they are
@@ -99,20 +99,21 @@ class Train:
             return
         from stereoforge.pipelines.prediction import open_settings, parameters_file
         from training.runs.hardware import process_rank
-        from training.runs.train import train, written_by
+        from training.runs.request import TrainingRequest
+        from training.runs.run_folder import written_networks
+        from training.runs.train import train
 
-        summary = train(
-            self.task,
-            data,
-            self.out,
-            self.preset,
+        through = open_settings(None, self.init) if self.task == "joint" and self.init else None
+        request = TrainingRequest(
+            task=self.task,
+            data=tuple(data),
+            out=self.out,
+            preset=self.preset,
             validation=self.validation,
             changes=self._changes(),
-            pseudo=self.pseudo,
+            pseudo_labels=self.pseudo_labels,
             init=self.init,
-            refinement=open_settings(None, self.init).ours_quadratic
-            if self.task == "joint" and self.init
-            else None,
+            refinement=through.ours_quadratic if through else None,
             resume=self.resume,
             steps=self.steps,
             seed=self.seed,
@@ -120,13 +121,14 @@ class Train:
             device=self.device,
             precision=self.precision,
         )
+        summary = train(request)
         if process_rank() > 0:
             return
         if self.task == "joint" and self.init is not None and parameters_file(self.init).exists():
             write_bytes(parameters_file(self.out), parameters_file(self.init).read_bytes())
         figures = ", ".join(f"{name} {value:.4g}" for name, value in summary.validation.items())
         console.print(
-            f"{self.out / ' and '.join(written_by(self.task))}: step {summary.best_step} of {summary.steps}"
+            f"{self.out / ' and '.join(written_networks(self.task))}: step {summary.best_step} of {summary.steps}"
             + (
                 f"; validation {figures}"
                 if figures
@@ -144,7 +146,7 @@ class Train:
             "correct_within",
             "ema",
             "curriculum",
-            "pseudo",
+            "pseudo_labels",
         ):
             if getattr(self, name):
                 name = name.replace("_", "-")

@@ -30,6 +30,7 @@ from stereoforge.pipelines.set_evaluation import (
 )
 from stereoforge.progress import console
 from stereoforge_kit.files import write_text
+from training.runs.request import TrainingRequest
 from training.runs.train import train
 
 NETWORKS = ("regressor", "confnet", "gradnet", "regressor_f")
@@ -84,7 +85,11 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
         write_gallery(data, gallery, scenes=plan.gallery_scenes)
     for network in NETWORKS:
         with clock.stage(f"training the {network}, {plan.steps[network]} steps"):
-            train(network, [(data, 1.0)], weights, "tiny", steps=plan.steps[network], resume=True)
+            train(
+                TrainingRequest(
+                    network, ((data, 1.0),), weights, "tiny", steps=plan.steps[network], resume=True
+                )
+            )
     (test,) = open_test_data([str(data)], "test")
     # There is no time to choose parameters here; the bundled ones were chosen on a validation set of such worlds.
     settings = open_settings(None, BUNDLED_WEIGHTS)

@@ -21,7 +21,7 @@ from refine.heuristic_inputs import consistency_confidence, local_gradients
 from refine.method import Method
 from stereoforge.errors import CommandError
 from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
-from training.prediction.predictor import FreePredictor, Prediction, StereoPredictor
+from training.prediction.predictor import Prediction, RegressorFreePredictor, StereoPredictor
 from training.runs.weights import has_weights, weights_path
 
 PredictorName = Literal["networks", "sgbm"]
@@ -40,7 +40,7 @@ class PairPredictor(Protocol):
 class MatchingPredictor:
     """Semi-global matching, or a given disparity, judged by the regressor-free networks or by heuristics."""
 
-    networks: FreePredictor
+    networks: RegressorFreePredictor
     matcher: SGBMParameters
 
     def predict(self, left: Image, right: Image) -> Prediction:
@@ -159,7 +159,7 @@ def forest_file(run: Path) -> Path:
 
 def open_matching(run: Path, device: str = "cpu", matcher: SGBMParameters | None = None) -> MatchingPredictor:
     """Semi-global matching with the regressor-free networks of a run folder."""
-    return MatchingPredictor(FreePredictor(run, device), matcher or SGBMParameters())
+    return MatchingPredictor(RegressorFreePredictor(run, device), matcher or SGBMParameters())
 
 
 def fallback_notes(run: Path) -> list[str]:

@@ -40,6 +40,7 @@ from stereoforge.study.statistics import describe, read_statistics, write_statis
 from stereoforge_kit.files import alone, write_bytes
 from training.presets import Preset, change_preset, find_preset
 from training.runs.model_card import write_model_card
+from training.runs.request import TrainingRequest
 from training.runs.train import train
 from training.runs.weights import copy_weights
 
@@ -249,11 +250,11 @@ class _Study:
         }
 
         def run(folder: Path) -> None:
-            train(
-                task,
-                [(data.source, 1.0)],
-                folder,
-                self.presets.get(task, self.plan.preset),
+            request = TrainingRequest(
+                task=task,
+                data=((data.source, 1.0),),
+                out=folder,
+                preset=self.presets.get(task, self.plan.preset),
                 changes=changes,
                 init=init.folder if init else None,
                 resume=True,
@@ -261,6 +262,7 @@ class _Study:
                 seed=self.plan.seed,
                 device=self.device,
             )
+            train(request)
 
         title = f"training the {task} on {domain}, {steps} steps"
         return make_job(

@@ -13,7 +13,7 @@ import pytest
 
 from datagen.formats import write_pfm, write_png
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.curation import fault_before_rendering
 from datagen.recipe.recipe import Recipe
 from refine.method import EvaluationFrame
@@ -46,7 +46,7 @@ def test_the_family_samples_worlds_that_can_be_rendered(monkeypatch: pytest.Monk
     assert 10 <= len(scenes[0].objects) - 1 <= 30
     curation = Recipe(config, {"train": 1}).curation
     assert any(
-        fault_before_rendering(SceneRayCaster(SceneGeometry(scene)), curation) is None for scene in scenes
+        fault_before_rendering(SceneRayCaster(build_geometry(scene)), curation) is None for scene in scenes
     )
 
 

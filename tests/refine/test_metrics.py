@@ -171,6 +171,7 @@ def test_optimal_auc_is_the_integral_of_the_optimal_curve(rate):
 def test_optimal_auc_at_its_ends():
     assert optimal_auc(1.0) == 1.0
     assert optimal_curve(1.0).auc == pytest.approx(1.0)
+    assert math.isnan(optimal_auc(NAN))
     with pytest.raises(ValueError, match=r"1\.2"):
         optimal_auc(1.2)
 

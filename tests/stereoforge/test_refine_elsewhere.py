@@ -11,7 +11,7 @@ from datagen.formats import read_pfm, write_pfm, write_png
 from stereoforge.cli import main
 from tests.training.synthetic import random_pair
 from training.networks import ConfNet, GradNet
-from training.presets import FreeConfNetPreset, FreeGradNetPreset, find_preset
+from training.presets import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset, find_preset
 from training.runs.weights import TrainingSummary, save_weights
 
 
@@ -109,8 +109,8 @@ def test_the_run_folders_networks_judge_it(world, tmp_path, capsys):
     run = tmp_path / "run"
     summary = TrainingSummary("custom", 1, 0, (("data", 1.0),), best_step=0)
     confnet, gradnet = find_preset("confnet_free", "tiny"), find_preset("gradnet_free", "tiny")
-    assert isinstance(confnet, FreeConfNetPreset)
-    assert isinstance(gradnet, FreeGradNetPreset)
+    assert isinstance(confnet, RegressorFreeConfNetPreset)
+    assert isinstance(gradnet, RegressorFreeGradNetPreset)
     save_weights(run, "confnet_free", ConfNet(confnet.network), summary)
     given = ("--disparity", folder / "given.pfm", "--weights", run)
     refine(folder, tmp_path / "part", *given)

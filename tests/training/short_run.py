@@ -6,9 +6,9 @@ from pathlib import Path
 
 import torch
 
+from tests.training.running import train_quietly
 from training.networks import DispNetConfig
 from training.presets import RegressorPreset, find_preset
-from training.runs.train import train
 
 VALIDATION_INTERVAL = 5  # steps; also between checkpoints
 
@@ -31,7 +31,7 @@ def run(data: Path, out: Path, crops: int, steps: int, resume: bool = False) -> 
     """Train with one thread; resumes where there is something to resume."""
     torch.set_num_threads(1)
     preset = preset_of(crops)
-    train("regressor", [(data, 1.0)], out, preset, steps=steps, seed=1, resume=resume, progress=False)
+    train_quietly("regressor", [(data, 1.0)], out, preset, steps=steps, seed=1, resume=resume)
 
 
 if __name__ == "__main__":

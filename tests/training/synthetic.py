@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from datagen.dataset.layout import FIRST_FRAME, Layout
 from datagen.dataset.manifest import SceneManifest, file_entry, write_manifest
 from datagen.formats import write_pfm, write_png
-from training.data.augmentation import StereoPair
+from training.data.augmentation import AugmentationConfig, StereoPair
 
 WAVES = 12
+NO_AUGMENTATION = AugmentationConfig(0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Centre crops, unchanged."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +75,10 @@ def render(layers: Sequence[Layer], height: int, width: int) -> StereoPair:
     images = np.zeros((2, height, width, 3))
     disparities = np.zeros((2, height, width), np.float32)
     for layer in layers:
-        for eye, x_left in enumerate((x, layer.left_of_right(x, y))):
+        for view, x_left in enumerate((x, layer.left_of_right(x, y))):
             seen = layer.contains(x_left, y)
-            images[eye][seen] = layer.color(x_left, y)[seen]
-            disparities[eye][seen] = layer.disparity_left(x_left, y)[seen]
+            images[view][seen] = layer.color(x_left, y)[seen]
+            disparities[view][seen] = layer.disparity_left(x_left, y)[seen]
     left, right = np.rint(images * 255).astype(np.uint8)
     return StereoPair(left, right, *disparities)
 
@@ -100,8 +102,8 @@ def write_dataset(
     width: int = 128,
     unknown_rows: int = 0,
 ) -> Path:
-    """A data set in the native layout, as much of it as training reads: one frame a scene. The left truth of training
-    scene n lacks its first n times `unknown_rows` rows."""
+    """A data set in the native layout, as much of it as training reads: one frame a scene. The left ground
+    truth of training scene n lacks its first n times `unknown_rows` rows."""
     layout = Layout(root)
     rng = np.random.default_rng(seed)
     for split, count in (("train", train), ("val", val)):
@@ -117,9 +119,9 @@ def write_dataset(
 def _write_scene(layout: Layout, split: str, scene: int, pair: StereoPair) -> None:
     entries = []
     views = {"left": (pair.left, pair.disparity_left), "right": (pair.right, pair.disparity_right)}
-    for eye, (image, disparity) in views.items():
-        picture = layout.file("frames_cleanpass", split, scene, eye, FIRST_FRAME)
-        truth = layout.file("disparity", split, scene, eye, FIRST_FRAME)
+    for view, (image, disparity) in views.items():
+        picture = layout.file("frames_cleanpass", split, scene, view, FIRST_FRAME)
+        truth = layout.file("disparity", split, scene, view, FIRST_FRAME)
         for path in (picture, truth):
             path.parent.mkdir(parents=True, exist_ok=True)
         write_png(picture, image)

@@ -1,4 +1,4 @@
-"""Every loss against a loop over pixels, missing truth included."""
+"""Every loss against a loop over pixels, missing ground truth included."""
 
 import math
 
@@ -115,7 +115,7 @@ def test_gradient_loss_masks_discontinuities(rng: np.random.Generator) -> None:
 
 
 def test_missing_truth_sends_no_gradient_back() -> None:
-    """Neither NaN nor anything else reaches a prediction through a pixel without truth."""
+    """Neither NaN nor anything else reaches a prediction through a pixel without ground truth."""
     truth = torch.full((1, 1, 4, 4), torch.nan)
     truth[..., :2] = 3.0
     prediction = torch.full((1, 1, 4, 4), 5.0, requires_grad=True)

@@ -6,8 +6,8 @@ from dataclasses import fields, is_dataclass, replace
 import pytest
 import torch
 
+from training.data.batch import StereoBatch
 from training.losses import STAGE_WEIGHTS
-from training.metrics import bad_rate, gradient_error, optimal_auc, sparsification_auc
 from training.networks import (
     ConfNet,
     DispNetConfig,
@@ -17,7 +17,7 @@ from training.networks import (
     left_right_consistency,
     predict_right,
 )
-from training.prediction.inference import regress
+from training.networks.inference import regress
 from training.presets import (
     PRESETS,
     ConfNetPreset,
@@ -110,13 +110,10 @@ def test_the_full_loss_weighs_the_scales_of_the_step(step: int, monkeypatch: pyt
     task = narrow_task()
     monkeypatch.setattr(type(task), "global_step", property(lambda _: step))
     torch.manual_seed(0)
-    batch = {"left": torch.rand(1, 3, 64, 64), "right": torch.rand(1, 3, 64, 64)}
-    batch["disparity"] = torch.full((1, 1, 64, 64), 7.0)
+    left, right = torch.rand(1, 3, 64, 64), torch.rand(1, 3, 64, 64)
+    batch = StereoBatch(left, right, torch.full((1, 1, 64, 64), 7.0), torch.zeros(1, 2, 64, 64))
     with torch.no_grad():
-        errors = [
-            (torch.relu(d) - 7.0).abs().mean().item()
-            for d in task.network(batch["left"], batch["right"]).disparities
-        ]
+        errors = [(torch.relu(d) - 7.0).abs().mean().item() for d in task.network(left, right).disparities]
         loss = task.loss(batch).item()
     row = STAGE_WEIGHTS[min(step // 100_000, 6)]
     assert loss == pytest.approx(sum(w * e for w, e in zip(row, errors, strict=True)), rel=1e-5)
@@ -133,7 +130,7 @@ def test_full_heads_see_the_features_and_the_mirrored_consistency() -> None:
     confnet = ConfNetTask(presets["confnet"], regressor, ConfNet(presets["confnet"].network), 1, 0)
     gradnet = GradNetTask(presets["gradnet"], regressor, GradNet(presets["gradnet"].network), 1, 0)
     left, right = torch.rand(2, 1, 3, 64, 128)
-    batch = {"left": left, "right": right}
+    batch = StereoBatch(left, right, torch.zeros(1, 1, 64, 128), torch.zeros(1, 2, 64, 128))
     (image, features, consistency), disparity = confnet.head_inputs(batch)
     assert (image.shape[1], features.shape[1], consistency.shape[1]) == (3, 97, 1)
     with torch.no_grad():
@@ -191,25 +188,3 @@ def test_warmup_and_cosine() -> None:
     assert factors[50] == pytest.approx(0.5)
     assert factors[99] == pytest.approx(0.5 * (1 + math.cos(math.pi * 0.99)))
     assert learning_rate_factor(config, 500, 1000, 100) == pytest.approx(0.5)
-
-
-def test_sparsification() -> None:
-    """Perfect confidence gives the optimal area, constant confidence the bad rate, reversed more than that."""
-    generator = torch.Generator().manual_seed(0)
-    truth = torch.zeros(1, 1, 100, 200)
-    disparity = 4 * torch.rand(truth.shape, generator=generator)
-    truth[..., :20] = torch.nan
-    rate = bad_rate(disparity, truth, 1.0)
-    assert rate.item() == pytest.approx(0.75, abs=0.01)
-    perfect = sparsification_auc(-disparity, disparity, truth)
-    assert perfect.item() == pytest.approx(optimal_auc(rate).item(), abs=2e-3)
-    assert optimal_auc(torch.tensor(0.2348)).item() == pytest.approx(0.0300, abs=1e-4)
-    constant = sparsification_auc(torch.zeros_like(truth), disparity, truth)
-    assert constant.item() == pytest.approx(rate.item(), abs=0.02)
-    assert sparsification_auc(disparity, disparity, truth) > constant
-
-
-def test_gradient_error_counts_smooth_pixels() -> None:
-    truth = torch.tensor([[[[0.0, 0.5, 3.0, torch.nan]], [[0.25, -0.5, 0.0, 0.0]]]])
-    gradient = torch.tensor([[[[0.1, 0.5, 0.0, 0.0]], [[0.0, 0.0, 0.0, 0.0]]]])
-    assert gradient_error(gradient, truth, 1.0).item() == pytest.approx((0.1 + 0.25 + 0.5) / 2)

@@ -1,1 +1,1 @@
-"""From frames to batches: crops, augmentation, pseudo labels."""
+"""From the frames of data sets to batches: crops, augmentation, pseudo labels."""

@@ -1,8 +1,7 @@
 """Random changes to a stereo pair that keep it a rectified pair with exact disparity.
 
-Geometry (one window, zoom and squeeze for both views) and colour follow the augmentation layers of the released
-DispNet training definition. Images are resampled bilinearly; disparity and gradients never are, they take the
-nearest pixel's value.
+Geometry (one crop window, zoom and squeeze for both views) and colour follow the augmentation layers of the released
+DispNet training definition. Images are interpolated bilinearly. Disparity and gradients take the nearest pixel's value.
 """
 
 from __future__ import annotations
@@ -21,78 +20,98 @@ Float32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class StereoPair:
-    """One decoded frame, as much of it as training uses."""
+    """One decoded frame: its images and the ground truth that training uses."""
 
     left: NDArray[np.uint8]
     """(H, W, 3) sRGB."""
     right: NDArray[np.uint8]
+    """(H, W, 3) sRGB."""
     disparity_left: Float32
     """(H, W) px, NaN invalid."""
     disparity_right: Float32 | None
-    """None where the data set has none; such a pair cannot be mirrored."""
+    """(H, W) px, NaN invalid; None if the data set has none. Such a pair cannot be mirrored."""
 
     @property
     def nbytes(self) -> int:
+        """Memory of all arrays, in bytes."""
         right = 0 if self.disparity_right is None else self.disparity_right.nbytes
         return self.left.nbytes + self.right.nbytes + self.disparity_left.nbytes + right
 
 
 @dataclass(frozen=True)
 class TrainingSample:
-    """What the networks see and are told."""
+    """One crop: what the networks see, and its ground truth."""
 
     left: Float32
     """(H, W, 3) in 0..1."""
     right: Float32
+    """(H, W, 3) in 0..1."""
     disparity: Float32
-    """(H, W) of the left view, px of this crop, NaN invalid."""
+    """(H, W) of the left view, in pixels of this crop, NaN invalid."""
     gradient: Float32
     """(H, W, 2) forward differences [dx, dy] in px per pixel of this crop, NaN invalid."""
 
 
 @dataclass(frozen=True)
 class AugmentationConfig:
-    """Ranges of the random changes; the defaults are the released ones. `log_` ranges are exponentiated."""
+    """Ranges of the random changes; the defaults are those of the released training definition.
+
+    Where a field's name begins with `log_`, the factor is the exponential of the number drawn. U(a, b) is the uniform
+    distribution.
+    """
 
     translation: float = 0.4
-    """Window centre from the image's centre, U(-this, this) of the crop's sides."""
+    """Distance of the window's centre from the image's, U(-this, this) times the crop's width and height."""
     log_zoom: tuple[float, float] = (-0.2, 0.6)
+    """Zoom of both axes; above 0 the crop is magnified."""
     log_squeeze: tuple[float, float] = (-0.3, 0.3)
-    """q: horizontal zoom times q, vertical zoom divided by q."""
+    """Factor q by which the horizontal zoom is multiplied and the vertical zoom divided."""
     horizontal_flip: float = 0.0
-    """Probability of mirroring, which swaps the views and takes the right view's truth. Pairs without that truth
-    stay as they are."""
+    """Probability of mirroring left-right, which swaps the views and takes the right view's ground truth. Pairs without
+    it stay as they are (ours)."""
     vertical_flip: float = 0.0
-    """Probability of turning upside down."""
+    """Probability of mirroring top-bottom (ours)."""
     shear: float = 0.0
-    """A quarter of the pairs have the rows of their right view moved, further and further down or up the image, as if
-    all that is seen leant: U(-this, this) pixels of disparity a pixel down are added (ours). So a network that was
-    shown things in the air has seen the slant of a road, too."""
+    """A quarter of the pairs are sheared: the rows of the right view are moved, row by row further, so that
+    U(-this, this) pixels of disparity are added per row, as if everything were slanted (ours). A network that trains on
+    flying things sees slants like a road's this way."""
     log_brightness: float = 0.4
-    """Factor exp U(-this, this), and so on for gamma, contrast and the factor of each colour channel."""
+    """Factor exp U(-this, this) of all colour channels together."""
     log_gamma: float = 0.4
+    """Exponent exp U(-this, this) of the colours."""
     log_contrast: float = 0.4
+    """Factor exp U(-this, this) of the colours' distance from middle grey."""
     log_color: float = 0.2
+    """Factor exp U(-this, this) of each colour channel by itself."""
     noise: float = 0.06
-    """Standard deviation of the Gaussian noise, U(0, this) of the range 0..1, drawn for each view alike."""
+    """Standard deviation of the Gaussian noise, U(0, this) of the range 0..1, the same for both views."""
     right_only: float = 0.01
-    """Spread of the small extra gamma, brightness, contrast and colour change of the right view."""
+    """Standard deviation of the small additional brightness, contrast, gamma and colour changes of the right view."""
 
 
-NO_AUGMENTATION = AugmentationConfig(0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 SHEARED = 0.25
+"""Share of the pairs that `AugmentationConfig.shear` applies to."""
 WINDOW_TRIALS = 50
+"""Windows drawn before the centre crop is taken."""
 RIGHT_ONLY_GROWTH_STEPS = 50_000
+"""Steps after which `right_only_growth` is 0.75 (the released training definition)."""
 
 
 @dataclass(frozen=True)
 class Window:
-    """A crop's place in the source image: u of the crop lies at left_px + u / zoom_x of the source."""
+    """A crop's place in its source image.
+
+    The crop's point (u, v) is the source's point (left_px + u / zoom_x, top_px + v / zoom_y).
+    """
 
     left_px: float
+    """Left edge in pixels of the source."""
     top_px: float
+    """Top edge in pixels of the source."""
     zoom_x: float
+    """Pixels of the crop per pixel of the source, horizontally."""
     zoom_y: float
+    """Pixels of the crop per pixel of the source, vertically."""
 
 
 def augment(
@@ -105,9 +124,11 @@ def augment(
     """Draw one training sample from a pair.
 
     Args:
-        rng: decides everything.
+        rng: Source of all randomness.
+        pair: The frame.
         size: (height, width) of the sample.
-        step: training step; the right view's own changes grow with it.
+        config: Ranges of the changes.
+        step: Training step; the right view's own changes grow with it.
 
     Raises:
         ValueError: the pair is smaller than `size`.
@@ -128,8 +149,10 @@ def augment(
 
 
 def draw_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Float32:
-    """Standard normal numbers, read from a random place of a long table: drawing them afresh would be half the
-    cost of a crop."""
+    """Standard normal numbers of a shape, read from a random place in a long table.
+
+    To draw them anew would be half the cost of a crop.
+    """
     table = _normal_table()
     return np.resize(table[rng.integers(len(table) // 2) :], shape)
 
@@ -140,9 +163,10 @@ def _normal_table() -> Float32:
 
 
 def mirror(pair: StereoPair) -> StereoPair:
-    """Mirror left-right: the mirrored right view is the left view of a pair with positive disparity again.
+    """Mirror left-right and swap the views, so that disparity is positive again.
 
-    Raises ValueError for a pair without the right view's truth.
+    Raises:
+        ValueError: the pair has no ground truth of the right view.
     """
     if pair.disparity_right is None:
         raise ValueError("a pair without the right view's disparity cannot be mirrored")
@@ -163,7 +187,17 @@ def turn_over(pair: StereoPair) -> StereoPair:
 def draw_window(
     rng: np.random.Generator, source: tuple[int, ...], size: tuple[int, int], config: AugmentationConfig
 ) -> Window:
-    """A window inside the source, by rejection; the plain centre crop when no trial fits."""
+    """Draw a window inside the source, by rejection; the centre crop without zoom if no trial fits.
+
+    Args:
+        rng: Source of all randomness.
+        source: (height, width, ...) of the source image.
+        size: (height, width) of the crop.
+        config: Ranges of the changes.
+
+    Raises:
+        ValueError: the source is smaller than `size`.
+    """
     (source_height, source_width), (height, width) = source[:2], size
     if source_height < height or source_width < width:
         raise ValueError(f"a {width}x{height} crop does not fit into a {source_width}x{source_height} image")
@@ -182,7 +216,7 @@ def draw_window(
 
 
 def draw_shear(rng: np.random.Generator, config: AugmentationConfig) -> float:
-    """Disparity to add per row of the source, px; nothing is drawn where the range is empty."""
+    """Draw the disparity to add per row of the source, in pixels. Nothing is drawn if the range is empty."""
     if config.shear == 0:
         return 0.0
     slope = rng.uniform(-config.shear, config.shear)
@@ -196,15 +230,18 @@ def cut(
     tone_curves: tuple[Float32, Float32],
     shear: float = 0.0,
 ) -> TrainingSample:
-    """Recolour and resample both views, and the left truth, through one window.
+    """Crop, recolour and resample both views and the left view's ground truth.
 
-    A surface d(x, y) seen through zooms (zx, zy) has disparity zx d, slope dx along x and zx / zy dy along y.
-    The gradients are differences of the source's truth: those of a zoomed, nearest-sampled map would be stairs.
+    A surface d(x, y) seen with zooms (zx, zy) has disparity zx d, slope dx along x and zx / zy dy along y. The
+    gradients are differences of the source's ground truth, since a zoomed map of nearest pixels would have steps.
 
     Args:
+        pair: The source.
+        window: The crop's place in it.
+        size: (height, width) of the crop.
         tone_curves: (256, 3) colours in 0..1 of the levels 0..255, for the left and the right view.
-        shear: Disparity added from row to row, px of the source; none in the window's first row, or, where it is
-            negative, in its last: disparities stay positive. What hides what in a row stays as it was.
+        shear: Disparity added per row, in pixels of the source. It is 0 in the window's first row or, if negative, in
+            its last, so disparities stay positive. Occlusions in a row stay as they were.
     """
     rows = window.top_px + (np.arange(size[0]) + 0.5) / window.zoom_y
     columns = window.left_px + (np.arange(size[1]) + 0.5) / window.zoom_x
@@ -234,13 +271,18 @@ def missing_at_borders(gradient: Float32) -> Float32:
 def sample_bilinear(
     image: NDArray[np.uint8], rows: NDArray[np.float64], columns: NDArray[np.float64], tone_curve: Float32
 ) -> Float32:
-    """A recoloured image at a grid of points, (len(rows), columns.shape[-1], 3).
+    """Recolour an image and interpolate it bilinearly at a grid of points.
 
-    Pixel centres lie at + 0.5. Not OpenCV's warp, which rounds positions to 1/32 px: an error in disparity.
+    OpenCV's warp is not used, since it rounds positions to 1/32 px, which would be an error in disparity.
 
     Args:
-        rows: (H,).
-        columns: (W,), or (H, W) where each row has its own.
+        image: (h, w, 3) uint8.
+        rows: (H,) positions in pixels; pixel centres lie at + 0.5.
+        columns: (W,) positions, or (H, W) if each row has its own.
+        tone_curve: (256, 3) colours in 0..1 of the levels 0..255.
+
+    Returns:
+        (H, W, 3) in 0..1.
     """
     row, row_weight = _neighbours(rows, image.shape[0])
     column, column_weight = _neighbours(columns, image.shape[1])
@@ -264,12 +306,21 @@ def _at_columns(lines: Float32, columns: NDArray[np.int64]) -> Float32:
 
 
 IDENTITY_CURVE: Float32 = np.repeat(np.linspace(0, 1, 256, dtype=np.float32)[:, None], 3, axis=1)
+"""(256, 3) tone curve that changes no colour."""
 
 
 def draw_tone_curves(
     rng: np.random.Generator, config: AugmentationConfig, step: int
 ) -> tuple[Float32, Float32]:
-    """Brightness, colour, contrast and gamma as (256, 3) tables: alike for both views, a little more for the right."""
+    """Draw brightness, colour, contrast and gamma as (256, 3) tone curves of the left and the right view.
+
+    Both views get the same changes, and the right view small ones of its own.
+
+    Args:
+        rng: Source of all randomness.
+        config: Ranges of the changes.
+        step: Training step; the right view's own changes grow with it.
+    """
     brightness, contrast, gamma = np.exp(
         rng.uniform(-1, 1, 3) * (config.log_brightness, config.log_contrast, config.log_gamma)
     )
@@ -283,13 +334,21 @@ def draw_tone_curves(
 
 
 def tone_curve(color: NDArray[np.float64], offset: float, contrast: float, gamma: float) -> Float32:
-    """clip((level * color + offset - 1/2) * contrast + 1/2, 0, 1) ** gamma for the levels 0..255, (256, 3)."""
+    """Colours clip((level * color + offset - 1/2) * contrast + 1/2, 0, 1) ** gamma of the levels 0..255, (256, 3).
+
+    Args:
+        color: (3,) factors.
+        offset, contrast, gamma: Numbers for all channels.
+    """
     curve = np.clip((IDENTITY_CURVE * color + offset - 0.5) * contrast + 0.5, 0, 1) ** gamma
     return curve.astype(np.float32)
 
 
 def right_only_growth(step: int) -> float:
-    """0.5 at the start towards 1, 0.75 after 50,000 steps: the released training's schedule."""
+    """Factor of the right view's own changes: it grows from 0.5 to 1, with 0.75 after 50,000 steps.
+
+    This is the schedule of the released training definition.
+    """
     return float(1 / (1 + np.exp(-np.log(3) * step / RIGHT_ONLY_GROWTH_STEPS)))
 
 
@@ -298,7 +357,7 @@ def _nearest(positions: NDArray[np.float64], length: int) -> NDArray[np.int64]:
 
 
 def _neighbours(positions: NDArray[np.float64], length: int) -> tuple[NDArray[np.int64], Float32]:
-    """Index of the pixel before each position and the weight of the one after, borders repeated."""
+    """Index of the pixel before each position, and the weight of the pixel after it; borders are repeated."""
     centred = np.clip(positions - 0.5, 0, length - 1)
     before = np.minimum(np.floor(centred).astype(np.int64), max(length - 2, 0))
     return before, (centred - before).astype(np.float32)

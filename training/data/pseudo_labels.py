@@ -1,12 +1,13 @@
-"""Training on disparities that somebody else predicted, in place of a data set's own truth.
+"""Training on pseudo labels: disparities that another method predicted, in place of a data set's own ground truth.
 
-The paper's GradNet for KITTI, whose laser truth is too sparse for gradients, learned from the dense disparities of
-another stereo method.
+The paper trains GradNet for KITTI this way. Laser ground truth is too sparse for gradients, so the network learns from
+the dense disparities of another stereo method.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import overload
@@ -17,20 +18,37 @@ from numpy.typing import NDArray
 from datagen.formats import read_pfm
 from datagen.sources.kitti import read_disparity as read_kitti_disparity
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
+from training.data.pipeline import Source
 from training.errors import TrainingError
 
 _READERS = {".pfm": read_pfm, ".png": read_kitti_disparity}
 
 
-class PseudoFrames(Sequence[StereoFrame]):
-    """The frames of a data set with the disparities of a folder for their left view's truth.
+def with_pseudo_labels(sources: Sequence[Source], folder: Path) -> Source:
+    """The only source, with the disparities of a folder in place of its ground truth.
 
-    A frame `a/b` takes `a/b.pfm` of the folder (pixels; infinity or NaN where there is none) or `a/b.png` (as KITTI's:
-    16 bits, over 256, 0 where there is none). The right view has no truth then, and occlusion is unknown.
+    Raises:
+        TrainingError: several sources, or a frame that the folder has no disparity for.
+    """
+    if len(sources) != 1:
+        raise TrainingError("training on pseudo labels needs exactly one data set")
+    return replace(sources[0], frames=PseudoLabelFrames(sources[0].frames, folder))
+
+
+class PseudoLabelFrames(Sequence[StereoFrame]):
+    """The frames of a data set, with the disparities of a folder as ground truth of their left views.
+
+    A frame `a/b` takes `a/b.pfm` of the folder (in pixels; infinity or NaN where unknown) or `a/b.png` (as KITTI has
+    it: 16 bits, 256 times the disparity, 0 where unknown). The right view then has no ground truth, and occlusion is
+    unknown.
     """
 
     def __init__(self, frames: Sequence[StereoFrame], folder: Path) -> None:
-        """Raises TrainingError, naming the first frame that the folder has nothing for."""
+        """Find the file of every frame.
+
+        Raises:
+            TrainingError: names the first frame that the folder has no disparity for.
+        """
         self._frames = frames
         self._files = [_file_of(folder, frame.name) for frame in frames]
 

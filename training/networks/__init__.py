@@ -1,6 +1,21 @@
-"""The networks: DispNetCorr1D, and ConfNet and GradNet which look at its features.
+"""The networks: DispNetCorr1D predicts disparity; ConfNet and GradNet judge it from its matching features.
 
-Their default constructors give the published (full) networks.
+Their default constructors give the full networks of the paper.
+
+Examples:
+    >>> import torch
+    >>> from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, HeadConfig
+    >>> regressor = DispNetCorr1D(DispNetConfig(width=0.0625)).eval()
+    >>> confnet = ConfNet(HeadConfig(width=8, hidden=8).on(regressor)).eval()
+    >>> left, right = torch.rand(2, 1, 3, 64, 128)
+    >>> with torch.no_grad():
+    ...     output = regressor(left, right)
+    >>> disparity = full_resolution(output.disparities[-1], (64, 128)).relu()
+    >>> disparity.shape
+    torch.Size([1, 1, 64, 128])
+    >>> consistency = left_right_consistency(disparity, disparity)
+    >>> confnet.confidence(left, output.features, consistency).shape
+    torch.Size([1, 1, 64, 128])
 """
 
 from training.networks.confnet import ConfNet

@@ -10,24 +10,34 @@ from torch import Tensor, nn
 def correlate_1d(left: Tensor, right: Tensor, max_displacement: int = 40, one_sided: bool = False) -> Tensor:
     """Correlate two feature maps along their rows.
 
-    c[k](y, x) = mean over channels of left(y, x) * right(y, x + k - max_displacement), zero outside the image.
-    A point with disparity d (in pixels of the feature map) answers in channel max_displacement - d.
+    c[k](y, x) = mean over channels of left(y, x) * right(y, x + k - max_displacement), where `right` is zero outside
+    the image. A point with disparity d (in pixels of the feature map) has its peak in channel max_displacement - d.
 
-    The products of all displacements are one matrix product a row and tile: a tile of T left columns against
-    the T + K - 1 right columns it can reach. The wanted band of that product is read off by skewing its rows
-    (padding each by one element and reshaping), so forward and backward are GEMMs and copies, about ten times
-    faster on a CPU than K shifted elementwise products, and memory stays linear in the width.
+    The products of all displacements are one matrix product per row and tile: a tile of T left columns times the
+    T + K - 1 right columns that it can reach. The wanted band of that product is read off by skewing its rows (padding
+    each by one element and reshaping). So forward and backward passes are matrix products and copies: about ten times
+    faster on a CPU than K shifted elementwise products, with memory linear in the width.
 
     Args:
         left, right: (B, C, H, W).
-        max_displacement: reach in pixels of the feature map.
-        one_sided: only k = 0 .. max_displacement: disparities are not negative, so the rest never matches.
+        max_displacement: Largest displacement in pixels of the feature map.
+        one_sided: Only the channels k = 0 .. max_displacement. Disparities are not negative, so the others never match
+            (ours).
 
     Returns:
         (B, K, H, W) with K = 2 * max_displacement + 1, or max_displacement + 1 when one-sided.
 
     Raises:
         ValueError: the feature maps differ in shape or are not 4-dimensional.
+
+    Examples:
+        >>> right = torch.rand(1, 8, 2, 10)
+        >>> left = right.roll(3, dims=-1)  # every point moves by 3 px: its disparity
+        >>> correlate_1d(left, right, max_displacement=4).shape
+        torch.Size([1, 9, 2, 10])
+        >>> products = (left * right.roll(3, dims=-1)).mean(dim=1)
+        >>> torch.allclose(correlate_1d(left, right, 4)[:, 4 - 3, :, 3:], products[..., 3:])
+        True
     """
     if left.shape != right.shape or left.dim() != 4:
         raise ValueError(
@@ -52,12 +62,18 @@ def correlate_1d(left: Tensor, right: Tensor, max_displacement: int = 40, one_si
 
 
 def displacement_count(max_displacement: int, one_sided: bool) -> int:
-    """Channels of the correlation."""
+    """Number of the correlation's channels."""
     return max_displacement + 1 if one_sided else 2 * max_displacement + 1
 
 
 class Correlation1D(nn.Module):
-    """`correlate_1d` as a layer."""
+    """`correlate_1d` as a layer.
+
+    Examples:
+        >>> layer = Correlation1D(max_displacement=4, one_sided=True)
+        >>> layer(torch.rand(1, 8, 2, 10), torch.rand(1, 8, 2, 10)).shape
+        torch.Size([1, 5, 2, 10])
+    """
 
     def __init__(self, max_displacement: int = 40, one_sided: bool = False) -> None:
         super().__init__()
@@ -66,7 +82,9 @@ class Correlation1D(nn.Module):
 
     @property
     def out_channels(self) -> int:
+        """Number of channels of the output."""
         return displacement_count(self.max_displacement, self.one_sided)
 
     def forward(self, left: Tensor, right: Tensor) -> Tensor:
+        """Correlate two feature maps (B, C, H, W) to (B, K, H, W), K = `out_channels`."""
         return correlate_1d(left, right, self.max_displacement, self.one_sided)

@@ -1,4 +1,4 @@
-"""What speaks for and against a disparity, from the pair and the disparity itself (ours)."""
+"""Cost features: what the pair and the disparity itself say for and against each pixel's disparity (ours)."""
 
 from __future__ import annotations
 
@@ -9,57 +9,73 @@ import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
 
 COST_OFFSETS_PX = (-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
-"""Matching costs are taken this far from the disparity: a right one has its least cost in the middle."""
+"""Matching costs are taken at these distances from the disparity; a correct one has its least cost at 0."""
 COST_CEILING = 0.25
-"""Larger differences of colour (of 0..1) tell no more than this does."""
+"""Colour differences (in 0..1) are clipped here."""
 SLOPE_CEILING_PX = 4.0
-"""Larger differences between neighbours are edges and tell no more than this does."""
+"""Differences between neighbours are clipped here; larger ones are edges."""
 RESIDUAL_WINDOWS_PX = (5, 9, 17, 33)
+"""Widths of the square windows whose mean disparity a pixel's is compared with."""
 RESIDUAL_CEILING_PX = 8.0
+"""Distances to such a mean are clipped here."""
 LEFT_BORDER_CAP_PX = 160.0
-"""Columns count up to here, beyond which every disparity of interest has its match inside."""
+"""Column numbers are clipped here; further to the right every disparity of interest has its match inside the image."""
 
-EVIDENCE_CHANNELS = len(COST_OFFSETS_PX) + 2 + 2 * len(RESIDUAL_WINDOWS_PX) + 2
-"""Channels of `disparity_evidence`."""
+COST_FEATURE_CHANNELS = len(COST_OFFSETS_PX) + 2 + 2 * len(RESIDUAL_WINDOWS_PX) + 2
+"""Channels of `cost_feature_maps`."""
 
 SMOOTH_WITHIN_PX = 2.0
-"""A pixel with a larger forward difference lies on an edge and says nothing of its surface's slope."""
+"""A pixel with a larger forward difference lies on an edge and says nothing about its surface's slope."""
 SLOPE_WINDOWS_PX = (5, 9, 17, 33, 65)
+"""Widths of the square windows over which slopes are averaged."""
 SLOPE_CHANNELS = 2 * len(SLOPE_WINDOWS_PX)
 """Channels of `smooth_slopes`."""
 
 
-class Evidence:
-    """What a pair and a disparity of its left view say: worked out when a network asks, once for all that do.
+class CostFeatures:
+    """A pair and a disparity of its left view, with the maps made from them.
 
-    Args:
-        left, right: (B, 3, H, W) in 0..1.
-        disparity: (B, 1, H, W) px, finite.
+    Each map is computed when a network asks for it, and only once.
+
+    Examples:
+        >>> left, right = torch.rand(2, 1, 3, 8, 12)
+        >>> features = CostFeatures(left, right, torch.ones(1, 1, 8, 12))
+        >>> features.maps.shape, features.slopes.shape
+        (torch.Size([1, 21, 8, 12]), torch.Size([1, 10, 8, 12]))
     """
 
     def __init__(self, left: Tensor, right: Tensor, disparity: Tensor) -> None:
+        """Keep the inputs.
+
+        Args:
+            left, right: (B, 3, H, W) in 0..1.
+            disparity: (B, 1, H, W) px, finite.
+        """
         self.left, self.right, self.disparity = left, right, disparity
 
     @cached_property
     def maps(self) -> Tensor:
-        """`disparity_evidence`."""
-        return disparity_evidence(self.left, self.right, self.disparity)
+        """`cost_feature_maps`, (B, `COST_FEATURE_CHANNELS`, H, W)."""
+        return cost_feature_maps(self.left, self.right, self.disparity)
 
     @cached_property
     def slopes(self) -> Tensor:
-        """`smooth_slopes`."""
+        """`smooth_slopes`, (B, `SLOPE_CHANNELS`, H, W) px per px."""
         return smooth_slopes(self.disparity)
 
 
-def disparity_evidence(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
-    """Matching costs around a disparity, its slopes, its distance to its surroundings and their roughness, its place.
+def cost_feature_maps(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
+    """Maps that tell correct disparities from wrong ones.
+
+    In this order: `matching_costs`, `limited_slopes`, for each of `RESIDUAL_WINDOWS_PX` the distance to the window's
+    mean disparity and the mean absolute distance in the window, and the columns of the pixel and of its match.
 
     Args:
         left, right: (B, 3, H, W) in 0..1.
         disparity: (B, 1, H, W) px of the left view, finite.
 
     Returns:
-        (B, `EVIDENCE_CHANNELS`, H, W), all bounded.
+        (B, `COST_FEATURE_CHANNELS`, H, W), all bounded.
     """
     columns = torch.arange(disparity.shape[-1], device=disparity.device, dtype=disparity.dtype)
     places = torch.cat([columns.expand_as(disparity), columns - disparity], dim=1)
@@ -75,12 +91,19 @@ def disparity_evidence(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor
 
 
 def matching_costs(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
-    """Mean absolute colour difference to the right view at the disparity plus each of `COST_OFFSETS_PX`.
+    """Mean absolute colour difference to the right view, at the disparity plus each of `COST_OFFSETS_PX`.
 
-    The right view is read bilinearly; beyond its borders it repeats. Arguments as for `disparity_evidence`.
+    The right view is interpolated linearly along its rows; its border columns are repeated outside the image. Arguments
+    as for `cost_feature_maps`.
 
     Returns:
-        (B, 9, H, W), at most `COST_CEILING`.
+        (B, 9, H, W) in 0..`COST_CEILING`.
+
+    Examples:
+        >>> right = torch.rand(1, 3, 4, 20)
+        >>> costs = matching_costs(right.roll(2, dims=-1), right, torch.full((1, 1, 4, 20), 2.0))
+        >>> costs[0, :, :, 8:-4].mean((1, 2)).argmin().item() == COST_OFFSETS_PX.index(0.0)
+        True
     """
     width = left.shape[-1]
     columns = torch.arange(width, device=left.device, dtype=disparity.dtype)
@@ -97,14 +120,21 @@ def matching_costs(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
 
 
 def smooth_slopes(disparity: Tensor) -> Tensor:
-    """Mean forward differences of the smooth pixels in windows around each pixel: the slope of a surface, from near and
-    far, without the edges between surfaces.
+    """Mean forward differences of the smooth pixels in windows around each pixel.
+
+    They are the slope of a surface without the edges between surfaces.
 
     Args:
         disparity: (B, 1, H, W) px, finite.
 
     Returns:
-        (B, `SLOPE_CHANNELS`, H, W): dx and dy of each of `SLOPE_WINDOWS_PX`, 0 where a window holds no smooth pixel.
+        (B, `SLOPE_CHANNELS`, H, W) px per px: dx and dy of each of `SLOPE_WINDOWS_PX`, 0 where a window holds no smooth
+        pixel.
+
+    Examples:
+        >>> ramp = 0.5 * torch.arange(12.0).expand(1, 1, 8, 12)
+        >>> smooth_slopes(ramp)[0, :2, 4, 4]  # dx and dy of the smallest window
+        tensor([0.5000, 0.0000])
     """
     slopes = _differences(disparity)
     smooth = (slopes.abs() <= SMOOTH_WITHIN_PX).all(dim=1, keepdim=True).to(slopes.dtype)
@@ -114,7 +144,11 @@ def smooth_slopes(disparity: Tensor) -> Tensor:
 
 
 def limited_slopes(disparity: Tensor) -> Tensor:
-    """Forward differences [dx, dy] of (B, 1, H, W), within `SLOPE_CEILING_PX`; 0 in the last column and row."""
+    """Forward differences [dx, dy] of a disparity (B, 1, H, W), clipped at `SLOPE_CEILING_PX`.
+
+    Returns:
+        (B, 2, H, W) px per px; dx is 0 in the last column, dy in the last row.
+    """
     return _differences(disparity).clamp(-SLOPE_CEILING_PX, SLOPE_CEILING_PX)
 
 
@@ -126,7 +160,7 @@ def _differences(disparity: Tensor) -> Tensor:
 
 
 def _surroundings(disparity: Tensor) -> list[Tensor]:
-    """For each window the signed distance to its mean, and the mean absolute one in it."""
+    """For each window, the signed distance to its mean and the mean absolute distance in it."""
     maps = []
     for window, mean in zip(RESIDUAL_WINDOWS_PX, box_means(disparity, RESIDUAL_WINDOWS_PX), strict=True):
         residual = (disparity - mean).clamp(-RESIDUAL_CEILING_PX, RESIDUAL_CEILING_PX)
@@ -135,17 +169,21 @@ def _surroundings(disparity: Tensor) -> list[Tensor]:
 
 
 def box_means(maps: Tensor, windows: tuple[int, ...]) -> list[Tensor]:
-    """Means over square windows around each pixel, as much of them as lies inside.
+    """Means over square windows around each pixel; at the borders, over the part of the window inside the image.
 
-    By sums over all that is above and to the left (Crow 1984), in float64 so that differences of large sums keep their
-    digits: the cost does not grow with the windows.
+    By summed-area tables (Crow 1984), so the cost does not grow with the windows. The sums are float64, since
+    differences of large sums lose digits.
 
     Args:
         maps: (B, C, H, W).
-        windows: Odd widths, px.
+        windows: Widths in pixels, odd.
 
     Returns:
-        For each window (B, C, H, W) in the maps' type.
+        For each window, (B, C, H, W) in the maps' type.
+
+    Examples:
+        >>> box_means(torch.arange(5.0).view(1, 1, 1, 5), (3,))[0].flatten().tolist()
+        [0.5, 1.0, 2.0, 3.0, 3.5]
     """
     sums = F.pad(maps.double().cumsum(-1).cumsum(-2), (1, 0, 1, 0))
     ones = [torch.ones(size, dtype=torch.float64, device=maps.device) for size in maps.shape[-2:]]
@@ -158,7 +196,7 @@ def box_means(maps: Tensor, windows: tuple[int, ...]) -> list[Tensor]:
 
 
 def _differences_across(sums: Tensor, window: int) -> Tensor:
-    """Along the last axis, from sums before each place, (..., N + 1): the windows' own sums, (..., N)."""
+    """Sums over windows along the last axis, (..., N), from cumulative sums (..., N + 1) that begin with 0."""
     reach = window // 2
     last = sums[..., -1:].expand(*sums.shape[:-1], reach)
     padded = torch.cat([F.pad(sums, (reach, 0)), last], dim=-1)

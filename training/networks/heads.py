@@ -1,4 +1,4 @@
-"""The trunk that ConfNet and GradNet share: a small fully convolutional network on image and features."""
+"""What ConfNet and GradNet share: a small fully convolutional network on the image and matching features."""
 
 from __future__ import annotations
 
@@ -12,45 +12,69 @@ from torch import Tensor, nn
 from training.networks.regressors.dispnet import LEAKY_SLOPE, DispNetCorr1D, FeatureKind, Normalization
 
 Activation = Literal["relu", "leaky_relu"]
+"""After every convolution but the last: ReLU in ConfNet, LeakyReLU in GradNet (the paper)."""
 
 
 @dataclass(frozen=True)
 class HeadConfig:
-    """What may vary about ConfNet and GradNet; the paper publishes neither widths nor dropout."""
+    """Options of ConfNet and GradNet.
+
+    The defaults are the full networks. The paper gives neither widths nor dropout, so those are ours.
+
+    Examples:
+        >>> from training.networks.regressors.dispnet import DispNetConfig
+        >>> regressor = DispNetCorr1D(DispNetConfig(width=0.25))
+        >>> HeadConfig(half_resolution=True).on(regressor).feature_channels
+        25
+    """
 
     feature_channels: int = 97
     """Channels of the regressor's matching features."""
     width: int = 64
     """Channels of the four 3x3 convolutions (ours)."""
     hidden: int = 128
-    """Channels of the 1x1 convolution that stands for a full connection (ours)."""
+    """Channels of the 1x1 convolution that takes the place of a fully connected layer (ours)."""
     dropout: float = 0.5
-    """Share of hidden channels' pixels dropped in training (ours)."""
+    """Share of the hidden activations dropped in training (ours)."""
     normalization: Normalization = "none"
-    """`batch` puts BatchNorm after the 3x3 convolutions."""
+    """`batch` puts BatchNorm after the 3x3 convolutions (ours)."""
     half_resolution: bool = False
-    """Work at the features' own resolution and upsample the outputs bilinearly: a quarter of the cost (ours).
+    """Work at the matching features' resolution and upsample the outputs bilinearly, at a quarter of the cost (ours).
     The outputs keep their units: probabilities, and pixels per full-resolution pixel."""
     dilations: tuple[int, int, int, int] = (1, 1, 1, 1)
-    """Of the 3x3 convolutions: how far apart, in pixels, they look. Features of a regressor have seen their
-    surroundings already; a disparity's own have not (ours)."""
-    evidence: bool = False
-    """Also see what the pair and the disparity itself say, `training.networks.cost_features` (ours)."""
+    """Dilations of the 3x3 convolutions. A regressor's features cover their surroundings already; features made from a
+    disparity do not, and need larger ones (ours)."""
+    cost_features: bool = False
+    """Take the maps of `training.networks.cost_features` as inputs too (ours)."""
     features: FeatureKind = "joined"
-    """Which features: `joined`, as the paper's words say (97 at full width), or `decoded`, which are 32."""
+    """Which matching features of the regressor: `joined`, as the paper words it (97 channels at full width), or
+    `decoded` (32 channels)."""
 
     def on(self, regressor: DispNetCorr1D) -> HeadConfig:
-        """The same for as many channels as this regressor's features have."""
+        """The same config with the number of channels of this regressor's features."""
         return replace(self, feature_channels=regressor.feature_channels[self.features])
 
 
 class PixelHead(nn.Module):
-    """Four 3x3 convolutions, a 1x1 convolution as full connection, dropout, a 1x1 output."""
+    """Four 3x3 convolutions, a 1x1 convolution as fully connected layer, dropout, and a 1x1 convolution.
+
+    The layers are the paper's, applied to every pixel of the image at once.
+    """
 
     input_mean: Tensor
+    """(C,) means of the input channels."""
     input_std: Tensor
+    """(C,) standard deviations of the input channels."""
 
     def __init__(self, config: HeadConfig, extra_channels: int, outputs: int, activation: Activation) -> None:
+        """Make the layers with new weights (He initialisation).
+
+        Args:
+            config: The network's options.
+            extra_channels: Input channels beside the image and the matching features.
+            outputs: Output channels.
+            activation: After every convolution but the last.
+        """
         super().__init__()
         self.config = config
         in_channels = 3 + config.feature_channels + extra_channels
@@ -75,10 +99,10 @@ class PixelHead(nn.Module):
                 nn.init.zeros_(layer.bias)
 
     def joined_input(self, *inputs: Tensor) -> Tensor:
-        """Bring image, features and extras to the working resolution and join them, (B, C, h, w).
+        """Resize all inputs to the working resolution and concatenate their channels, (B, C, h, w).
 
         Args:
-            inputs: the left image (B, 3, H, W) in 0..1 first; then maps of full or half resolution.
+            inputs: The left image (B, 3, H, W) in 0..1 first; then maps of full or half resolution.
         """
         height, width = inputs[0].shape[-2:]
         if self.config.half_resolution:
@@ -86,15 +110,19 @@ class PixelHead(nn.Module):
         return torch.cat([_resized(x, height, width) for x in inputs], dim=1)
 
     def standardize(self, mean: Tensor, std: Tensor) -> None:
-        """Set the fixed statistics of `joined_input`'s channels, measured once on the training set.
+        """Set the fixed statistics by which the channels of `joined_input` are standardised.
 
-        The matching features mix activations with a disparity in pixels, so they need it; fixed numbers, not a
-        normalisation layer, so that a unit of disparity means the same in every batch.
+        The matching features mix activations with a disparity in pixels, so they need it. The numbers are fixed, unlike
+        a normalisation layer's, so that a pixel of disparity means the same in every batch (ours).
+
+        Args:
+            mean, std: (C,) of the training set.
         """
         self.input_mean.copy_(mean)
         self.input_std.copy_(std.clamp(min=1e-3))
 
     def forward(self, *inputs: Tensor) -> Tensor:
+        """Outputs (B, outputs, H, W) at the image's resolution, from the inputs of `joined_input`."""
         joined = self.joined_input(*inputs)
         output: Tensor = self.layers(
             (joined - self.input_mean[:, None, None]) / self.input_std[:, None, None]

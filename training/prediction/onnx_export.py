@@ -1,4 +1,4 @@
-"""Networks of a run folder as one ONNX file that needs neither torch nor this package."""
+"""The networks of a run folder as one ONNX file, which needs neither torch nor this package."""
 
 from __future__ import annotations
 
@@ -15,27 +15,31 @@ from torch.onnx import OnnxExporterError
 from stereoforge_kit.files import temporary_folder, write_bytes
 from training.errors import TrainingError
 from training.networks import ConfNet, Correlation1D, DispNetCorr1D, GradNet
-from training.prediction.inference import head_inputs, network_size
+from training.networks.inference import head_inputs, network_size
 from training.prediction.predictor import StereoPredictor
 
 FILE_NAME = "stereoforge.onnx"
+"""Name of the file that is written."""
 OPSET = 17
+"""Version of ONNX's operators."""
 TOLERANCE = 1e-3
-"""Largest difference to torch, relative to the output's largest value."""
+"""Largest difference to torch's outputs, relative to their largest value."""
 
 
 @dataclass(frozen=True)
 class ExportedModel:
-    """A file, and how far its answers were from torch's."""
+    """An ONNX file, and how far its outputs were from torch's."""
 
     path: Path
+    """The file."""
     outputs: tuple[str, ...]
+    """Names of its outputs."""
     largest_difference: float
-    """Relative to the output's largest value."""
+    """Largest difference to torch's outputs, relative to their largest value."""
 
 
 class ShiftedCorrelation(nn.Module):
-    """`Correlation1D` as shifted products: slower to run, but the same graph for any image size."""
+    """`Correlation1D` as shifted products: slower, but with the same graph for any image size."""
 
     def __init__(self, correlation: Correlation1D) -> None:
         super().__init__()
@@ -43,6 +47,7 @@ class ShiftedCorrelation(nn.Module):
         self.count = correlation.out_channels
 
     def forward(self, left: Tensor, right: Tensor) -> Tensor:
+        """As `Correlation1D.forward`."""
         padded = F.pad(right, (self.reach, self.count - 1 - self.reach))
         width = left.shape[-1]
         products = [(left * padded[..., shift : shift + width]).mean(dim=1) for shift in range(self.count)]
@@ -50,7 +55,7 @@ class ShiftedCorrelation(nn.Module):
 
 
 class ExportedNetworks(nn.Module):
-    """Everything a run folder says about a pair; left and right are (B, 3, H, W) in 0..1, sides multiples of 64."""
+    """All networks of a run folder as one module."""
 
     def __init__(self, regressor: DispNetCorr1D, confnet: ConfNet | None, gradnet: GradNet | None) -> None:
         super().__init__()
@@ -58,6 +63,7 @@ class ExportedNetworks(nn.Module):
 
     @property
     def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs, in their order."""
         names = {
             "disparity": True,
             "confidence": self.confnet is not None,
@@ -66,7 +72,15 @@ class ExportedNetworks(nn.Module):
         return tuple(name for name, there in names.items() if there)
 
     def forward(self, left: Tensor, right: Tensor) -> tuple[Tensor, ...]:
-        """disparity (B, 1, H, W) px; confidence (B, 1, H, W); gradient (B, 2, H, W) [dx, dy]."""
+        """Predict all maps of the left view.
+
+        Args:
+            left, right: (B, 3, H, W) in 0..1, H and W multiples of 64.
+
+        Returns:
+            Disparity (B, 1, H, W) px, then confidence (B, 1, H, W) and gradient (B, 2, H, W) as [dx, dy], of the
+            networks that there are.
+        """
         seen = head_inputs(self.regressor, self.confnet, self.gradnet, left, right)
         answers = [seen.regression.disparity]
         if self.confnet is not None:
@@ -77,12 +91,17 @@ class ExportedNetworks(nn.Module):
 
 
 def export_model(run: Path, out: Path) -> ExportedModel:
-    """Write `stereoforge.onnx` with the regressor of a run folder and what else it holds, for images of any size.
+    """Write `stereoforge.onnx` with the regressor of a run folder, and its ConfNet and GradNet if it has them.
 
-    The file is run by onnxruntime on two sizes and compared with torch before it is kept.
+    The model takes images of any size that is a multiple of 64. Before the file is kept, onnxruntime runs it on two
+    sizes, and the outputs are compared with torch's.
+
+    Args:
+        run: Run folder.
+        out: Folder for the file.
 
     Raises:
-        TrainingError: no regressor, damaged weights, a network that ONNX cannot express, or answers that differ.
+        TrainingError: no regressor, damaged weights, a network that ONNX cannot express, or outputs that differ.
     """
     networks = ExportedNetworks(*StereoPredictor(run).networks).eval()
     with temporary_folder() as folder:
@@ -93,14 +112,14 @@ def export_model(run: Path, out: Path) -> ExportedModel:
             raise TrainingError(f"{run}: torch cannot write it as ONNX: {_first_sentence(error)}") from error
         difference = max(_compare(networks, written, size) for size in ((64, 128), (128, 192)))
         if not difference <= TOLERANCE:
-            raise TrainingError(f"{run}: onnxruntime's answers differ from torch's by {difference:.2g}")
+            raise TrainingError(f"{run}: onnxruntime's outputs differ from torch's by {difference:.2g}")
         path = out / FILE_NAME
         write_bytes(path, written.read_bytes())
     return ExportedModel(path, networks.outputs, difference)
 
 
 def _first_sentence(error: Exception) -> str:
-    """torch's message goes on with the whole graph."""
+    """The first sentence of torch's message, which continues with the whole graph."""
     return re.split(r"[.\n]\s", str(error).strip(), maxsplit=1)[0]
 
 

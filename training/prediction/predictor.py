@@ -1,4 +1,4 @@
-"""Prediction with a run folder's networks."""
+"""Prediction with the networks of a run folder, from arrays to arrays."""
 
 from __future__ import annotations
 
@@ -12,36 +12,38 @@ from torch import Tensor
 
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetCorr1D, GradNet
-from training.networks.cost_features import Evidence
-from training.prediction.inference import estimate
-from training.prediction.regressor_free import FreeInputs, as_free_inputs
+from training.networks.cost_features import CostFeatures
+from training.networks.inference import estimate
+from training.networks.regressor_free import RegressorFreeInputs, regressor_free_inputs
 from training.runs.weights import has_weights, load_confnet, load_gradnet, load_regressor, on_regressor
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What the networks say about one pair."""
+    """The networks' outputs for one pair."""
 
     disparity: NDArray[np.float32]
-    """(H, W) px of the input, left view."""
+    """(H, W) px of the left view, at the images' resolution."""
     confidence: NDArray[np.float32] | None
     """(H, W) in 0..1, or None without a ConfNet."""
     gradient: NDArray[np.float32] | None
-    """(H, W, 2) forward differences [dx, dy], or None without a GradNet."""
+    """(H, W, 2) forward differences [dx, dy] in px per px, or None without a GradNet."""
 
 
 class StereoPredictor:
     """The networks of a run folder, ready to predict.
 
-    Images are resized (not padded) to multiples of 64, as the original network's are, and the answers resized back.
+    Images are resized to multiples of 64, not padded, as the original network does it. The outputs are resized back.
     """
 
     def __init__(self, run: Path | str, device: str = "cpu", regressor: str = "regressor") -> None:
-        """Read what the folder holds; ConfNet and GradNet are optional.
+        """Read the regressor, and ConfNet and GradNet if the folder has them.
 
         Args:
-            regressor: `regressor`, or `regressor_f`, whose disparity comes without confidence and gradient: those
-                networks know the features of the `regressor` only.
+            run: Run folder.
+            device: A torch device.
+            regressor: `regressor`, or `regressor_f`. The latter's disparity comes without confidence and gradient,
+                since those networks were trained on the features of `regressor`.
 
         Raises:
             TrainingError: no regressor, damaged files, or a ConfNet or GradNet trained on another regressor.
@@ -63,7 +65,7 @@ class StereoPredictor:
         return self._regressor, self._confnet, self._gradnet
 
     def predict(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> Prediction:
-        """Predict the left view's maps.
+        """Predict disparity, confidence and gradient of the left view.
 
         Args:
             left, right: (H, W, 3) uint8 sRGB, rectified.
@@ -72,7 +74,7 @@ class StereoPredictor:
             TrainingError: images of another kind, or of different sizes.
         """
         check_images(left, right)
-        answer = estimate(
+        found = estimate(
             self._regressor,
             self._confnet,
             self._gradnet,
@@ -80,24 +82,34 @@ class StereoPredictor:
             _as_tensor(right, self._device),
         )
         return Prediction(
-            disparity=_as_array(answer.disparity)[..., 0],
-            confidence=None if answer.confidence is None else _as_array(answer.confidence)[..., 0],
-            gradient=None if answer.gradient is None else _as_array(answer.gradient),
+            disparity=_as_array(found.disparity)[..., 0],
+            confidence=None if found.confidence is None else _as_array(found.confidence)[..., 0],
+            gradient=None if found.gradient is None else _as_array(found.gradient),
         )
 
     def predict_right(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """The right view's disparity (H, W): that of the mirrored, swapped pair, mirrored back. As `predict`."""
+        """Predict the right view's disparity (H, W) px: that of the swapped views, mirrored.
+
+        Arguments and errors as for `predict`.
+        """
         check_images(left, right)
         views = (_as_tensor(image[:, ::-1], self._device) for image in (right, left))
         mirrored = _as_array(estimate(self._regressor, None, None, *views).disparity)[..., 0]
         return np.ascontiguousarray(mirrored[:, ::-1])
 
 
-class FreePredictor:
-    """ConfNet and GradNet of a run folder for the disparity of any predictor (`confnet_free`, `gradnet_free`)."""
+class RegressorFreePredictor:
+    """The regressor-free ConfNet and GradNet of a run folder (`confnet_free`, `gradnet_free`).
+
+    They judge the disparity of any predictor (ours).
+    """
 
     def __init__(self, run: Path | str, device: str = "cpu") -> None:
-        """Read what the folder holds, both networks being optional.
+        """Read the networks that the folder has; it may have none.
+
+        Args:
+            run: Run folder.
+            device: A torch device.
 
         Raises:
             TrainingError: no such folder, or damaged files.
@@ -121,11 +133,15 @@ class FreePredictor:
         disparity: NDArray[np.float32],
         disparity_right: NDArray[np.float32],
     ) -> Prediction:
-        """Confidence and gradient of a left view's disparity; the disparity itself with its holes filled.
+        """Predict confidence and gradient of a disparity from another predictor.
 
         Args:
-            left, right: (H, W, 3) uint8 sRGB.
-            disparity, disparity_right: (H, W) px, NaN in holes; the right view's confirms the left view's.
+            left, right: (H, W, 3) uint8 sRGB, rectified.
+            disparity, disparity_right: (H, W) px of the left and the right view, NaN in holes. The left view's is
+                judged, and compared with the right view's.
+
+        Returns:
+            The left view's disparity with its holes filled from the background, its confidence and its gradient.
 
         Raises:
             TrainingError: images of another kind, or arrays of different sizes.
@@ -137,21 +153,27 @@ class FreePredictor:
                     f"the {name} disparity is {maps.shape[1]}x{maps.shape[0]}, "
                     f"the image {left.shape[1]}x{left.shape[0]}"
                 )
-        inputs = FreeInputs(*(maps.to(self._device) for maps in as_free_inputs(disparity, disparity_right)))
+        inputs = RegressorFreeInputs(
+            *(maps.to(self._device) for maps in regressor_free_inputs(disparity, disparity_right))
+        )
         image, other = (_as_tensor(view, self._device) for view in (left, right))
-        evidence = Evidence(image, other, inputs.disparity)
+        cost_features = CostFeatures(image, other, inputs.disparity)
         confidence = gradient = None
         if self._confnet is not None:
-            seen = self._confnet.inputs(inputs.features, inputs.consistency, evidence)
+            seen = self._confnet.inputs(inputs.features, inputs.consistency, cost_features)
             confidence = _as_array(self._confnet.confidence(*seen))[..., 0]
         if self._gradnet is not None:
-            seen = self._gradnet.inputs(inputs.features, evidence)
+            seen = self._gradnet.inputs(inputs.features, cost_features)
             gradient = _as_array(self._gradnet(*seen))
         return Prediction(_as_array(inputs.disparity)[..., 0], confidence, gradient)
 
 
 def check_images(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> None:
-    """Raise TrainingError unless both are (H, W, 3) of uint8, not empty, and alike."""
+    """Check that both images are (H, W, 3) uint8, not empty, and of one size.
+
+    Raises:
+        TrainingError: they are not.
+    """
     for name, image in (("left", left), ("right", right)):
         if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
             raise TrainingError(

@@ -1,4 +1,4 @@
-"""Progress on the terminal, and the best weights on disk while a run goes on."""
+"""Progress on the terminal, and the best weights on disk, during a run."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ from training.tasks import StereoTask
 
 
 class BestWeights(pl.Callback):
-    """Hands the network over for saving whenever its validation figure is the best so far.
+    """Has the network saved whenever its validation figure is the best so far.
 
-    Until there is a finite figure, the latest weights are the best: without validation frames, or where they have no
-    truth for it, to the end. A figure that is not finite never beats one that is. The figure to beat is part of the
-    checkpoint, so a resumed run goes on comparing.
+    Until there is a finite figure, the latest weights are the best. So they are to the end if there are no validation
+    frames, or none with ground truth. A figure that is not finite never beats one that is. The best figure is part of
+    the checkpoint, so a resumed run continues to compare with it.
     """
 
     def __init__(self, save: Callable[[int, dict[str, float]], None]) -> None:
-        """save: called with the steps done and the validation figures."""
+        """Keep what saves the network: it is called with the steps done and the validation figures."""
         self._save = save
         self._best = math.inf
         self._step = 0
 
     def on_train_epoch_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:
+        """Compare the figure of the validation that has just ended, and save the network if it is the best."""
         if trainer.global_step == self._step:
             return  # Lightning ends the checkpoint's epoch once more after resuming, without validating
         self._step = trainer.global_step
@@ -42,14 +43,16 @@ class BestWeights(pl.Callback):
             self._save(trainer.global_step, figures)
 
     def state_dict(self) -> dict[str, Any]:
+        """What a checkpoint stores: the best figure and the step of the last validation."""
         return {"best": self._best, "step": self._step}
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Take up what a checkpoint stored."""
         self._best, self._step = state_dict["best"], state_dict["step"]
 
 
 class RunProgress(pl.Callback):
-    """One bar over the whole run with the time left, and a line for every validation."""
+    """A bar over the whole run with the time left, and a line for every validation."""
 
     def __init__(self, title: str) -> None:
         self._console = Console(stderr=True)
@@ -57,6 +60,7 @@ class RunProgress(pl.Callback):
         self._title = title
 
     def on_train_start(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002
+        """Show the bar, at the steps that a resumed run has done."""
         if not trainer.is_global_zero:
             self._console.quiet = True
         self._bar = self._progress.add_task(
@@ -72,9 +76,11 @@ class RunProgress(pl.Callback):
         batch: Any,  # noqa: ARG002
         batch_idx: int,  # noqa: ARG002
     ) -> None:
+        """Move the bar on, and show the loss."""
         self._progress.update(self._bar, completed=trainer.global_step, loss=float(outputs["loss"]))
 
     def on_train_epoch_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002
+        """Print the figures of a validation."""
         figures = "  ".join(f"{name} {value:.4g}" for name, value in validation_figures(trainer).items())
         if not figures:  # as when Lightning ends the checkpoint's epoch once more after resuming
             return
@@ -83,14 +89,16 @@ class RunProgress(pl.Callback):
         )
 
     def on_train_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002
+        """Remove the bar."""
         self._progress.stop()
 
     def on_exception(self, trainer: pl.Trainer, pl_module: StereoTask, exception: BaseException) -> None:  # noqa: ARG002
+        """Remove the bar."""
         self._progress.stop()
 
 
 def validation_figures(trainer: pl.Trainer) -> dict[str, float]:
-    """The figures of the last validation, by their short names."""
+    """The figures of the last validation, by their names without `validation/`."""
     return {
         name.removeprefix("validation/"): float(value)
         for name, value in trainer.callback_metrics.items()

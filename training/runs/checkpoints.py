@@ -13,10 +13,10 @@ from stereoforge_kit.files import replacing
 
 
 class WholeCheckpoints(TorchCheckpointIO):
-    """Writes beside the target and renames, so that a kill at any moment leaves the earlier checkpoint or the new one.
+    """Checkpoints that replace the earlier one at once, so that a kill at any moment leaves one of the two.
 
-    Lightning's own writes to the system's temporary folder first, and moving from there to another file system
-    copies.
+    They are written beside the target and renamed. Lightning's own are written to the system's temporary folder, from
+    where moving to another file system is a copy.
     """
 
     def save_checkpoint(
@@ -25,12 +25,13 @@ class WholeCheckpoints(TorchCheckpointIO):
         path: str | Path,
         storage_options: Any = None,  # noqa: ARG002
     ) -> None:
+        """Write a checkpoint to `path`."""
         with replacing(Path(path)) as temporary:
             torch.save(checkpoint, temporary)
 
 
 def last_checkpoint(path: Path) -> ModelCheckpoint:
-    """Replaces the one checkpoint of a run after every validation."""
+    """A callback that writes the run's only checkpoint to `path` after every validation."""
     return ModelCheckpoint(
         dirpath=path.parent,
         filename=path.stem,

@@ -1,4 +1,4 @@
-"""What a run computes on: one device, or one process a device under torchrun."""
+"""What a run computes on: one device, or under torchrun one process per device."""
 
 from __future__ import annotations
 
@@ -16,18 +16,24 @@ Precision = Literal["32", "bf16", "16"]
 
 
 def process_rank() -> int:
-    """This process's number among torchrun's, 0 without torchrun."""
+    """The number of this process among torchrun's, from 0; 0 without torchrun."""
     return int(os.environ.get("RANK", "0"))
 
 
 def process_count() -> int:
+    """The number of torchrun's processes; 1 without torchrun."""
     return int(os.environ.get("WORLD_SIZE", "1"))
 
 
 def trainer_options(device: str, precision: Precision) -> dict[str, Any]:
-    """Lightning's words for `auto`, `cpu`, `cuda`, `cuda:1`, ... and the processes that torchrun started.
+    """The options of Lightning's trainer for a device, a precision and the processes that torchrun started.
 
-    Raises TrainingError for a device or a precision that does not exist here.
+    Args:
+        device: `auto`, `cpu`, `cuda`, `cuda:1`, ...
+        precision: Bits of the convolutions.
+
+    Raises:
+        TrainingError: a device or a precision that this machine does not have.
     """
     kind, _, index = device.partition(":")
     try:
@@ -58,5 +64,8 @@ def trainer_options(device: str, precision: Precision) -> dict[str, Any]:
 
 
 def faster_layout(module: nn.Module) -> None:
-    """Lay the convolutions' weights out channels last, in place: all maps follow, and CPUs are about a tenth faster."""
+    """Store the convolutions' weights channels last, in place.
+
+    All feature maps follow, and training on a CPU is about a tenth faster.
+    """
     module.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -1,4 +1,4 @@
-"""`model_card.md` beside the weights: what each network of a run folder is, in words."""
+"""`model_card.md` beside the weights: what each network of a run folder is and how it was trained."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from training.presets import TASKS
 from training.runs.weights import TrainingSummary, has_weights, read_summary, weights_path
 
 FILE_NAME = "model_card.md"
+"""Name of the model card in a run folder."""
 _WHAT = {
     "regressor": "DispNetCorr1D: disparity of the left view from a rectified pair",
     "regressor_f": "DispNetCorr1D fine-tuned on disparity gradients too (eq. 9 of the paper)",
-    "confnet": "ConfNet: the probability that a disparity of `regressor` is right",
+    "confnet": "ConfNet: the probability that a disparity of `regressor` is correct",
     "gradnet": "GradNet: forward differences of the disparity",
-    "confnet_free": "ConfNet without matching features: for disparities of any origin",
-    "gradnet_free": "GradNet without matching features: for disparities of any origin",
+    "confnet_free": "Regressor-free ConfNet: for the disparity of any predictor",
+    "gradnet_free": "Regressor-free GradNet: for the disparity of any predictor",
 }
 _FIGURES = {
     "epe": "end-point error, px",
@@ -35,9 +36,17 @@ _FIGURES = {
 
 
 def write_model_card(run: Path, folder: Path | None = None) -> Path:
-    """Describe all networks of a run folder, there or in another folder.
+    """Write the model card of all networks of a run folder.
 
-    Raises TrainingError for damaged descriptions.
+    Args:
+        run: The run folder.
+        folder: Where to write the card; the run folder if None.
+
+    Returns:
+        The card's path.
+
+    Raises:
+        TrainingError: a description beside the weights is damaged.
     """
     lines = [
         "# Model card",
@@ -54,9 +63,10 @@ def write_model_card(run: Path, folder: Path | None = None) -> Path:
         "",
         "## Limits",
         "",
-        "Trained on rendered worlds unless the data above says otherwise; expect a loss of accuracy on photographs, "
-        "on disparities beyond those of the training set, and where matching has nothing to hold on to (sky, glass, "
-        "repetition). The figures are of validation frames, most often of the same source as the training set.",
+        "The networks were trained on rendered worlds, unless the data above says otherwise. They are less accurate on "
+        "photographs, on disparities beyond those of the training set, and where matching is ambiguous (sky, glass, "
+        "repetition). The figures are those of validation frames, which mostly come from the same source as the "
+        "training set.",
     ]
     path = (folder or run) / FILE_NAME
     write_text(path, "\n".join(lines) + "\n")

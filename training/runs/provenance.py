@@ -1,32 +1,17 @@
-"""Where a network comes from: which data, which version of the code."""
+"""Which version of the code trained a network."""
 
 from __future__ import annotations
 
-import hashlib
 import subprocess
-from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-import fsspec
-
-from datagen.sources.stereo_frame import StereoFrame
-
 PACKAGE = "stereoforge"
-
-
-def data_fingerprint(location: str, frames: Sequence[StereoFrame]) -> str:
-    """What identifies the frames: the digest of the set's recipe, or of the frames' names where it has none."""
-    try:
-        with fsspec.open(f"{location.rstrip('/')}/recipe.yaml", "rb") as file:
-            digest, what = hashlib.sha256(file.read()), "recipe"
-    except (OSError, ValueError, ImportError):
-        digest, what = hashlib.sha256("\n".join(frame.name for frame in frames).encode()), "frame names"
-    return f"{len(frames)} frames, {what} {digest.hexdigest()}"
+"""The distribution whose version counts."""
 
 
 def code_revision() -> str:
-    """The version, and the git revision where the code is a checkout (`-dirty`: with changes since)."""
+    """The release and, where the code is a git checkout, its revision (`-dirty` if files changed since)."""
     try:
         release = version(PACKAGE)
     except PackageNotFoundError:

@@ -1,7 +1,7 @@
-"""Trained networks on disk: `<run>/<task>.safetensors` and `<run>/<task>.json`.
+"""Trained networks on disk: `<run>/<task>.safetensors` with the tensors and `<run>/<task>.json`, their description.
 
-Reading them runs no code: safetensors hold numbers only, and the JSON is structured into typed records. The JSON
-carries the digest of the tensors' file, so a damaged or mixed-up pair is refused.
+To read them runs no code. Safetensors files hold numbers only, and the JSON becomes typed records. It holds the digest
+of the tensors' file, so damaged or mixed-up files are refused.
 """
 
 from __future__ import annotations
@@ -24,27 +24,32 @@ from training.errors import TrainingError
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
 
 Network = TypeVar("Network", bound=nn.Module)
+"""DispNetCorr1D, ConfNet or GradNet."""
 FORMAT = 1
+"""Version of the descriptions, which other versions refuse."""
 MAX_DESCRIPTION_BYTES = 1 << 20
+"""Larger descriptions are refused unread."""
 _CONVERTER = cattrs.Converter(forbid_extra_keys=True)
 
 
 @dataclass(frozen=True)
 class TrainingSummary:
-    """How a network came about."""
+    """How a network was trained."""
 
     preset: str
+    """Name of the preset, with the changes to it."""
     steps: int
-    """Of the whole run."""
+    """Optimizer steps of the whole run."""
     seed: int
+    """Seed of the run."""
     data: tuple[tuple[str, float], ...]
-    """Folder and weight of each data set."""
+    """Each data set, as it was named, and how often it was drawn from relative to the others."""
     best_step: int
-    """Steps done when these weights were taken."""
+    """Steps after which these weights were kept."""
     validation: dict[str, float] = field(default_factory=dict)
     """Figures of these weights on the validation frames; empty where there were none."""
     fingerprints: tuple[str, ...] = ()
-    """What identifies each data set's frames."""
+    """What identifies each data set's frames (`training.data.fingerprint`)."""
     revision: str = ""
     """Version and git revision of the code."""
 
@@ -56,13 +61,15 @@ class StoredNetwork(Generic[Network]):
     network: Network
     """In evaluation mode, on the CPU."""
     sha256: str
-    """Digest of the tensors' file."""
+    """SHA-256 of the tensors' file."""
     regressor_sha256: str | None
-    """Digest of the regressor that a ConfNet or GradNet was trained on."""
+    """SHA-256 of the regressor that a ConfNet or GradNet was trained on; None for other networks."""
     training: TrainingSummary
+    """How it was trained."""
 
 
 def weights_path(run: Path, task: str) -> Path:
+    """The tensors' file of a network."""
     return run / f"{task}.safetensors"
 
 
@@ -73,7 +80,15 @@ def save_weights(
     training: TrainingSummary,
     regressor_sha256: str | None = None,
 ) -> None:
-    """Write a network, each file at once or not at all."""
+    """Write a network and its description; each file is written whole or not at all.
+
+    Args:
+        run: Run folder.
+        task: Name of the files.
+        network: The network.
+        training: How it was trained.
+        regressor_sha256: SHA-256 of the regressor that a ConfNet or GradNet was trained on.
+    """
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
     content = safetensors.torch.save(tensors)
     description = {
@@ -89,22 +104,26 @@ def save_weights(
 
 
 def load_regressor(run: Path, task: str = "regressor") -> StoredNetwork[DispNetCorr1D]:
-    """Read `regressor` or `regressor_f` of a run folder. Raises TrainingError, naming what is wrong."""
+    """Read `regressor` or `regressor_f` of a run folder. Raises TrainingError for missing or damaged files."""
     return _load(run, task, lambda config: DispNetCorr1D(_structure(config, DispNetConfig)))
 
 
 def load_confnet(run: Path, task: str = "confnet") -> StoredNetwork[ConfNet]:
-    """Read `confnet` or `confnet_free` of a run folder. Raises TrainingError, naming what is wrong."""
+    """Read `confnet` or `confnet_free` of a run folder. Raises TrainingError for missing or damaged files."""
     return _load(run, task, lambda config: ConfNet(_structure(config, HeadConfig)))
 
 
 def load_gradnet(run: Path, task: str = "gradnet") -> StoredNetwork[GradNet]:
-    """Read `gradnet` or `gradnet_free` of a run folder. Raises TrainingError, naming what is wrong."""
+    """Read `gradnet` or `gradnet_free` of a run folder. Raises TrainingError for missing or damaged files."""
     return _load(run, task, lambda config: GradNet(_structure(config, HeadConfig)))
 
 
 def on_regressor(run: Path, task: str, stored: StoredNetwork[Network], regressor_sha256: str) -> Network:
-    """A head that was trained on this regressor; TrainingError if it was on another."""
+    """The network of a head that was trained on this regressor.
+
+    Raises:
+        TrainingError: it was trained on another one.
+    """
     if stored.regressor_sha256 != regressor_sha256:
         raise TrainingError(
             f"{run}: its {task} was trained on another regressor than the folder's; train it again"
@@ -113,7 +132,7 @@ def on_regressor(run: Path, task: str, stored: StoredNetwork[Network], regressor
 
 
 def read_summary(run: Path, task: str) -> TrainingSummary:
-    """How the network of a run folder came about. Raises TrainingError, naming what is wrong."""
+    """How the network of a run folder was trained. Raises TrainingError for a missing or damaged description."""
     path = run / f"{task}.json"
     try:
         summary: TrainingSummary = _structure(_read_description(path, task)["training"], TrainingSummary)
@@ -123,7 +142,7 @@ def read_summary(run: Path, task: str) -> TrainingSummary:
 
 
 def copy_weights(source: Path, target: Path, task: str) -> None:
-    """Copy a network, intact, from one run folder to another. Raises TrainingError, naming what is wrong."""
+    """Copy a network from one run folder to another. Raises TrainingError for missing or damaged files."""
     loaders = {"regressor": load_regressor, "confnet": load_confnet, "gradnet": load_gradnet}
     loaders[task.split("_")[0]](source, task)
     for path in (weights_path(source, task), source / f"{task}.json"):
@@ -131,6 +150,7 @@ def copy_weights(source: Path, target: Path, task: str) -> None:
 
 
 def has_weights(run: Path, task: str) -> bool:
+    """Whether a run folder holds the tensors of a network."""
     return weights_path(run, task).exists()
 
 
@@ -147,7 +167,7 @@ def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -
     if digest != description["sha256"]:
         raise TrainingError(f"{path}: damaged, or of another run than {description_path.name} beside it")
     try:
-        # Without memory of its own, the network takes no more than the file holds, whatever sizes it describes.
+        # On the meta device, the network takes no more memory than the file holds, whatever sizes it describes.
         with torch.device("meta"):
             network = build(description["network"])
         _fill(network, safetensors.torch.load(content))
@@ -161,7 +181,7 @@ def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -
 
 
 def _fill(network: nn.Module, tensors: Mapping[str, Tensor]) -> None:
-    """Make the tensors the network's. Raises RuntimeError or ValueError where names, shapes or types differ."""
+    """Give the network these tensors. Raises RuntimeError or ValueError if names, shapes or types differ."""
     wanted = network.state_dict()
     odd = [name for name, tensor in tensors.items() if name in wanted and tensor.dtype != wanted[name].dtype]
     if odd:

@@ -1,19 +1,19 @@
-"""The Lightning modules, one a task."""
+"""The Lightning modules that train the networks, one per task."""
 
 from training.tasks.base import StereoTask
 from training.tasks.heads import ConfNetTask, GradNetTask
 from training.tasks.joint import JointHeads, JointTask
 from training.tasks.regressor import FineTuningTask, RegressorTask
-from training.tasks.regressor_free import FreeConfNetTask, FreeGradNetTask
+from training.tasks.regressor_free import RegressorFreeConfNetTask, RegressorFreeGradNetTask
 
 __all__ = [
     "ConfNetTask",
     "FineTuningTask",
-    "FreeConfNetTask",
-    "FreeGradNetTask",
     "GradNetTask",
     "JointHeads",
     "JointTask",
+    "RegressorFreeConfNetTask",
+    "RegressorFreeGradNetTask",
     "RegressorTask",
     "StereoTask",
 ]

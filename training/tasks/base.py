@@ -1,4 +1,4 @@
-"""What all training tasks share: optimizer and schedule, the step's own randomness, the alarm on NaN."""
+"""What all tasks share: optimizer, schedule, the random state of a step, and the stop at a loss of NaN."""
 
 from __future__ import annotations
 
@@ -16,19 +16,26 @@ from torch.nn.modules.batchnorm import _BatchNorm
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from stereoforge_kit.viewing import Picture
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.errors import TrainingError
 from training.presets import OptimizerConfig, Preset
 
 STATISTICS_BATCHES = 200
-"""What BatchNorm's statistics are measured over before they are fixed: by two measurements over 100 batches the
-end-point error of the same weights differed by 4 %."""
+"""Batches over which BatchNorm's statistics are measured before they are fixed. Over 100 batches, two measurements
+gave end-point errors of the same weights that differed by 4 %."""
 PANELS = 3
-"""Validation frames shown in TensorBoard."""
+"""Number of validation frames shown in TensorBoard."""
 
 
 def learning_rate_factor(config: OptimizerConfig, step: int, steps: int, preset_steps: int) -> float:
-    """The learning rate at a step of a run of `steps`, relative to the configured one."""
+    """The learning rate at a step, relative to `config.learning_rate`.
+
+    Args:
+        config: The schedule, in steps of the preset.
+        step: Number of the step, from 0.
+        steps: Steps of the run.
+        preset_steps: Steps of the preset; the schedule is scaled from these to `steps`.
+    """
     position = step * preset_steps / steps
     if config.schedule == "halving":
         factor = 0.5 ** sum(position >= halving for halving in config.halve_at)
@@ -40,13 +47,21 @@ def learning_rate_factor(config: OptimizerConfig, step: int, steps: int, preset_
 
 
 class StereoTask(pl.LightningModule):
-    """One network in training."""
+    """A network in training."""
 
     monitor: ClassVar[str]
-    """The validation figure whose least value marks the best weights."""
+    """The validation figure whose smallest value marks the best weights."""
     network: nn.Module
+    """The network that is trained."""
 
     def __init__(self, preset: Preset, steps: int, seed: int) -> None:
+        """Keep the settings.
+
+        Args:
+            preset: Optimizer, schedule and losses.
+            steps: Optimizer steps of the run.
+            seed: Decides the random state of every step.
+        """
         super().__init__()
         self.preset = preset
         self.steps = steps
@@ -55,7 +70,7 @@ class StereoTask(pl.LightningModule):
         self._averaged: AveragedModel | None = None
 
     def average_weights(self, decay: float) -> None:
-        """Keep a moving average of the network's weights; from now on it is what is validated and saved."""
+        """Keep an exponential moving average of the network's weights, and validate and save that from now on."""
         average = get_ema_multi_avg_fn(decay)  # type: ignore[no-untyped-call]
         self._averaged = AveragedModel(self.network, multi_avg_fn=average)
         self._averaged.requires_grad_(False)
@@ -65,34 +80,38 @@ class StereoTask(pl.LightningModule):
         """The network that is validated and saved: the one trained, or its moving average."""
         return self.network if self._averaged is None else self._averaged.module
 
-    def on_train_batch_end(self, outputs: Any, batch: Batch, batch_idx: int) -> None:  # noqa: ARG002
+    def on_train_batch_end(self, outputs: Any, batch: StereoBatch, batch_idx: int) -> None:  # noqa: ARG002
+        """Update the moving average."""
         if self._averaged is not None:
             self._averaged.update_parameters(self.network)
 
     @abstractmethod
-    def loss(self, batch: Batch) -> Tensor:
-        """The loss of a batch of crops."""
+    def loss(self, batch: StereoBatch) -> Tensor:
+        """The loss of a batch of crops, a scalar."""
 
     @abstractmethod
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-        """Figures of one whole frame, and the maps its panel shows."""
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        """Figures of one whole frame, NaN where nothing can be measured, and the maps that its panel shows."""
 
     @abstractmethod
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
-        """The picture of a validation frame."""
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        """The picture of a validation frame for TensorBoard, from its batch and the maps of `validate_frame`."""
 
     def decayed_parameters(self) -> Iterable[nn.Parameter]:
-        """Parameters with weight decay: all that are trained, unless a task knows better."""
+        """The parameters with weight decay: all that are trained, unless a task overrides this."""
         return (p for p in self.network.parameters() if p.requires_grad)
 
-    def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:  # noqa: ARG002
-        # Dropout draws from torch's global generator; a state that follows from the step makes an interrupted
-        # run continue as if it had not been. `train` guards the caller's own state.
+    def on_train_batch_start(self, batch: StereoBatch, batch_idx: int) -> None:  # noqa: ARG002
+        """Set the random state of the step, and fix BatchNorm's statistics towards the end of the run."""
+        # Dropout draws from torch's global generator. Its state follows from the step, so that a resumed run equals
+        # an uninterrupted one. `train` restores the caller's own state.
         entropy = np.random.SeedSequence([self.seed, 3, self.global_step, self.global_rank])
         torch.manual_seed(int(entropy.generate_state(1, np.uint64)[0]))
         fixed_from = self.steps - round(self.preset.fixed_statistics * self.steps)
         norms = [part for part in self.network.modules() if isinstance(part, _BatchNorm)]
-        if norms and self.global_step == fixed_from > 0:  # from the start, they are those it came with
+        if (
+            norms and self.global_step == fixed_from > 0
+        ):  # from 0, the statistics that came with the network stay
             self._measure_statistics(norms)
         if self.global_step >= fixed_from:
             for norm in norms:
@@ -100,39 +119,48 @@ class StereoTask(pl.LightningModule):
 
     @torch.no_grad()
     def _measure_statistics(self, norms: Sequence[_BatchNorm]) -> None:
-        """Give BatchNorm the mean of many batches' statistics in place of a trace of the last few, by which
-        validation errors swing (Wu and Johnson, "Rethinking 'Batch' in BatchNorm", 2021)."""
+        """Give BatchNorm the mean of many batches' statistics.
+
+        Its own are a moving average over the last few batches, with which validation errors fluctuate (Wu and Johnson,
+        "Rethinking 'Batch' in BatchNorm", 2021).
+        """
         data = self.trainer.datamodule
         batches = data.block(self.trainer.current_epoch, self.trainer.global_rank, self.trainer.world_size)
         momenta = [norm.momentum for norm in norms]
         for norm in norms:
             norm.reset_running_stats()
-            norm.momentum = None  # torch's word for the mean of all
+            norm.momentum = None  # to torch this means the mean over all batches
         for batch in itertools.islice(batches, STATISTICS_BATCHES):
             self.loss(self.transfer_batch_to_device(batch, self.device, 0))
         for norm, momentum in zip(norms, momenta, strict=True):
             norm.momentum = momentum
 
-    def training_step(self, batch: Batch, batch_idx: int) -> Tensor:  # noqa: ARG002
+    def training_step(self, batch: StereoBatch, batch_idx: int) -> Tensor:  # noqa: ARG002
+        """The loss of a step, which is also logged.
+
+        Raises:
+            TrainingError: the loss is not finite.
+        """
         loss = self.loss(batch)
         if not torch.isfinite(loss):
             raise TrainingError(
                 f"the loss of step {self.global_step} is {loss.item()}, so training stopped; the last checkpoint "
                 f"is whole, and a smaller learning rate or gradient clipping usually helps"
             )
-        self.log("train/loss", loss.detach(), batch_size=len(batch["left"]), sync_dist=True)
+        self.log("train/loss", loss.detach(), batch_size=len(batch.left), sync_dist=True)
         self.log("train/learning_rate", self.optimizers().param_groups[0]["lr"])
         return loss
 
-    def validation_step(self, batch: Batch, batch_idx: int) -> None:
+    def validation_step(self, batch: StereoBatch, batch_idx: int) -> None:
+        """Log the figures of a frame, and the pictures of the first frames."""
         figures, maps = self.validate_frame(batch)
         answered = not any(bool(torch.isnan(each).all()) for each in maps.values())
         for name, value in figures.items():
-            # A frame whose truth says nothing of a figure does not count; one for which the network has no number does.
-            unknown = answered and bool(torch.isnan(value))
+            # A frame whose ground truth says nothing of a figure does not count; a network without an answer does.
+            unknown = answered and math.isnan(value)
             self.log(
                 f"validation/{name}",
-                torch.zeros_like(value) if unknown else value,
+                0.0 if unknown else value,
                 batch_size=0 if unknown else 1,
                 on_step=False,
                 on_epoch=True,
@@ -145,16 +173,20 @@ class StereoTask(pl.LightningModule):
             )
 
     def configure_optimizers(self) -> Any:
+        """Adam and the schedule of its learning rate, as Lightning takes them."""
         config = self.preset.optimizer
         decayed = list(self.decayed_parameters())
         known = {id(p) for p in decayed}
-        free = [p for p in self.network.parameters() if p.requires_grad and id(p) not in known]
+        undecayed = [p for p in self.network.parameters() if p.requires_grad and id(p) not in known]
         optimizer = torch.optim.Adam(
-            [{"params": decayed, "weight_decay": config.weight_decay}, {"params": free, "weight_decay": 0.0}],
+            [
+                {"params": decayed, "weight_decay": config.weight_decay},
+                {"params": undecayed, "weight_decay": 0.0},
+            ],
             lr=config.learning_rate,
             betas=config.betas,
             eps=config.epsilon,
-            # Gradients are clipped between unscaling and the step, which a fused optimizer does in one.
+            # Gradients are clipped between unscaling and the step; a fused optimizer does both at once.
             fused=not self.mixed_precision,
         )
         scheduler = torch.optim.lr_scheduler.LambdaLR(
@@ -170,6 +202,6 @@ def image_of(views: Tensor) -> Picture:
 
 
 def map_of(maps: Tensor) -> Any:
-    """The first of a batch of maps, (H, W) of one channel or (H, W, C), for `viewing`."""
+    """The first of a batch of maps (B, C, H, W), as (H, W) if C is 1, else (H, W, C)."""
     array = maps[0].float().cpu().numpy()
     return array[0] if len(array) == 1 else array.transpose(1, 2, 0)

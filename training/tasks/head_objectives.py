@@ -1,4 +1,4 @@
-"""What ConfNet and GradNet learn, whatever the disparity comes from."""
+"""Head objectives: what ConfNet and GradNet are trained for, wherever the disparity comes from."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
+from refine.metrics import optimal_auc
 from stereoforge_kit.viewing import (
     Picture,
     confidence_picture,
@@ -15,43 +16,47 @@ from stereoforge_kit.viewing import (
     gradient_picture,
     side_by_side,
 )
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.losses import confidence_cross_entropy, masked_gradient_l1
-from training.metrics import bad_rate, forward_differences, gradient_error, optimal_auc, sparsification_auc
+from training.metrics import bad_pixel_rate, forward_gradient, gradient_error, sparsification_auc
 from training.networks import ConfNet, GradNet
 from training.tasks.base import StereoTask, image_of, map_of
 
 
 class DisparityTask(StereoTask):
-    """A network that learns something about a disparity it is given."""
+    """Training of a head that judges a given disparity."""
 
     @abstractmethod
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
-        """What the network sees of training crops, and the disparity it is about."""
+    def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
+        """The network's inputs for a batch of crops, and the disparity (B, 1, H, W) px that it judges."""
 
     @abstractmethod
-    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        """The disparity, and what the kept network says of it, of a frame of any size."""
+    def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
+        """The disparity of a frame of any size, (B, 1, H, W) px, and the kept network's output for it."""
 
 
 class ConfidenceTask(DisparityTask):
-    """Cross-entropy of "correct within t" (section 3.2 of the paper)."""
+    """ConfNet's objective: cross-entropy of "correct within t" (section 3.2 of the paper)."""
 
     monitor = "validation/auc"
     network: ConfNet
+    """The network that is trained."""
     correct_within_px: float
+    """t in pixels."""
 
-    def loss(self, batch: Batch) -> Tensor:
+    def loss(self, batch: StereoBatch) -> Tensor:
+        """`confidence_cross_entropy` of a batch."""
         inputs, disparity = self.head_inputs(batch)
         return confidence_cross_entropy(
-            self.network(*inputs), disparity, batch["disparity"], self.correct_within_px
+            self.network(*inputs), disparity, batch.disparity, self.correct_within_px
         )
 
     @torch.no_grad()
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        """The sparsification areas of the confidence, of a random order and of the optimal one."""
         disparity, confidence = self.predict(batch)
-        truth, threshold = batch["disparity"], self.correct_within_px
-        rate = bad_rate(disparity, truth, threshold)
+        truth, threshold = batch.disparity, self.correct_within_px
+        rate = bad_pixel_rate(disparity, truth, threshold)
         figures = {
             "auc": sparsification_auc(confidence, disparity, truth, threshold),
             "auc_random": rate,
@@ -59,11 +64,12 @@ class ConfidenceTask(DisparityTask):
         }
         return figures, {"disparity": disparity, "confidence": confidence}
 
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
-        error = map_of(maps["disparity"] - batch["disparity"])
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        """Image, disparity error and confidence."""
+        error = map_of(maps["disparity"] - batch.disparity)
         return side_by_side(
             [
-                image_of(batch["left"]),
+                image_of(batch.left),
                 error_picture(error, self.correct_within_px),
                 confidence_picture(map_of(maps["confidence"])),
             ]
@@ -71,28 +77,33 @@ class ConfidenceTask(DisparityTask):
 
 
 class GradientTask(DisparityTask):
-    """Masked L1 on the disparity's forward differences (section 3.3 of the paper)."""
+    """GradNet's objective: masked L1 of the disparity's forward differences (section 3.3 of the paper)."""
 
     monitor = "validation/gradient"
     network: GradNet
+    """The network that is trained."""
     threshold_px: float
+    """Pixels with larger true differences are discontinuities and left out."""
     initial: ClassVar[str]
-    """What the disparity comes from, whose own gradients are the ones to do better than."""
+    """Where the disparity comes from; names the figure of its own gradients, which GradNet should beat."""
 
-    def loss(self, batch: Batch) -> Tensor:
+    def loss(self, batch: StereoBatch) -> Tensor:
+        """`masked_gradient_l1` of a batch."""
         inputs, _ = self.head_inputs(batch)
-        return masked_gradient_l1(self.network(*inputs), batch["gradient"], self.threshold_px)
+        return masked_gradient_l1(self.network(*inputs), batch.gradient, self.threshold_px)
 
     @torch.no_grad()
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        """The gradient errors of the network and of the disparity itself."""
         disparity, gradient = self.predict(batch)
-        own = forward_differences(disparity)
+        own = forward_gradient(disparity)
         figures = {
-            "gradient": gradient_error(gradient, batch["gradient"], self.threshold_px),
-            f"gradient_{self.initial}": gradient_error(own, batch["gradient"], self.threshold_px),
+            "gradient": gradient_error(gradient, batch.gradient, self.threshold_px),
+            f"gradient_{self.initial}": gradient_error(own, batch.gradient, self.threshold_px),
         }
         return figures, {"gradient": gradient, "own": own}
 
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
-        gradients = (batch["gradient"], maps["gradient"], maps["own"])
-        return side_by_side([image_of(batch["left"]), *(gradient_picture(map_of(g)) for g in gradients)])
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        """Image, true gradient, the network's gradient and the disparity's own."""
+        gradients = (batch.gradient, maps["gradient"], maps["own"])
+        return side_by_side([image_of(batch.left), *(gradient_picture(map_of(g)) for g in gradients)])

@@ -7,70 +7,74 @@ from typing import Self
 import torch
 from torch import Tensor
 
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.networks import ConfNet, DispNetCorr1D, GradNet
-from training.prediction.inference import estimate, head_inputs
+from training.networks.inference import estimate, head_inputs
 from training.presets import ConfNetPreset, GradNetPreset, Preset
 from training.tasks.base import StereoTask
 from training.tasks.head_objectives import ConfidenceTask, GradientTask
 
 
 class HeadTask(StereoTask):
-    """Networks on a frozen regressor."""
+    """Training of heads on a frozen regressor."""
 
     def __init__(self, preset: Preset, regressor: DispNetCorr1D, steps: int, seed: int) -> None:
+        """As `StereoTask`, with the regressor, whose parameters are frozen."""
         super().__init__(preset, steps, seed)
         self.regressor = regressor.requires_grad_(False).eval()
 
     def train(self, mode: bool = True) -> Self:
+        """Switch the heads to training or evaluation mode; the regressor stays in evaluation mode."""
         super().train(mode)
         self.regressor.eval()  # frozen means its BatchNorm statistics too
         return self
 
 
 class ConfNetTask(HeadTask, ConfidenceTask):
-    """`confnet`, of the regressor's disparities."""
+    """`confnet`: ConfNet on the regressor's disparity and features."""
 
     def __init__(
         self, preset: ConfNetPreset, regressor: DispNetCorr1D, network: ConfNet, steps: int, seed: int
     ) -> None:
+        """As `HeadTask`, with the network to train."""
         super().__init__(preset, regressor, steps, seed)
         self.network = network
         self.correct_within_px = preset.correct_within_px
 
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
-        with torch.no_grad():  # the regressor runs once
-            seen = head_inputs(self.regressor, self.network, None, batch["left"], batch["right"])
+    def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
+        """The network's inputs for a batch of crops, and the regressor's disparity."""
+        with torch.no_grad():
+            seen = head_inputs(self.regressor, self.network, None, batch.left, batch.right)
         return seen.confnet, seen.regression.disparity
 
-    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        disparity, confidence, _ = estimate(
-            self.regressor, self.kept_network, None, batch["left"], batch["right"]
-        )
+    def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
+        """Disparity and confidence of a frame of any size."""
+        disparity, confidence, _ = estimate(self.regressor, self.kept_network, None, batch.left, batch.right)
         assert confidence is not None
         return disparity, confidence
 
 
 class GradNetTask(HeadTask, GradientTask):
-    """`gradnet`, with the regressor's disparities to do better than."""
+    """`gradnet`: GradNet on the regressor's disparity and features."""
 
     initial = "regressor"
 
     def __init__(
         self, preset: GradNetPreset, regressor: DispNetCorr1D, network: GradNet, steps: int, seed: int
     ) -> None:
+        """As `HeadTask`, with the network to train."""
         super().__init__(preset, regressor, steps, seed)
         self.network = network
         self.threshold_px = preset.gradient_threshold_px
 
-    def head_inputs(self, batch: Batch) -> tuple[tuple[Tensor, ...], Tensor]:
+    def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
+        """The network's inputs for a batch of crops, and the regressor's disparity."""
         with torch.no_grad():
-            seen = head_inputs(self.regressor, None, self.network, batch["left"], batch["right"])
+            seen = head_inputs(self.regressor, None, self.network, batch.left, batch.right)
         return seen.gradnet, seen.regression.disparity
 
-    def predict(self, batch: Batch) -> tuple[Tensor, Tensor]:
-        disparity, _, gradient = estimate(
-            self.regressor, None, self.kept_network, batch["left"], batch["right"]
-        )
+    def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
+        """Disparity and gradient of a frame of any size."""
+        disparity, _, gradient = estimate(self.regressor, None, self.kept_network, batch.left, batch.right)
         assert gradient is not None
         return disparity, gradient

@@ -1,4 +1,4 @@
-"""Training ConfNet and GradNet through the refinement, against the refined disparity (ours)."""
+"""Training ConfNet and GradNet through the refinement, on the error of the refined disparity (ours)."""
 
 from __future__ import annotations
 
@@ -16,40 +16,42 @@ from stereoforge_kit.viewing import (
     gradient_picture,
     side_by_side,
 )
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.losses import confidence_cross_entropy, masked_gradient_l1, refinement_l1
 from training.metrics import (
-    bad_rate,
+    bad_pixel_rate,
     end_point_error,
-    forward_differences,
+    forward_gradient,
     gradient_error,
     sparsification_auc,
 )
 from training.networks import ConfNet, DispNetCorr1D, GradNet
-from training.prediction.inference import HeadInputs, estimate, head_inputs
+from training.networks.inference import HeadInputs, estimate, head_inputs
 from training.presets import JointPreset
 from training.tasks.base import image_of, map_of
 from training.tasks.heads import HeadTask
 
 
 class JointHeads(nn.Module):
-    """ConfNet and GradNet as one network to be trained."""
+    """ConfNet and GradNet as one network."""
 
     def __init__(self, confnet: ConfNet, gradnet: GradNet) -> None:
+        """Keep both networks."""
         super().__init__()
         self.confnet = confnet
         self.gradnet = gradnet
 
 
 class JointTask(HeadTask):
-    """L1 of the refined disparity and of its gradient, and a share of what the heads learned from before.
+    """`joint`: the heads' own losses plus L1 of the refined disparity and of its gradient.
 
-    The regressor is frozen. The refinement is solved exactly, and the loss's slope comes back through it by the
-    implicit function theorem, so ConfNet learns where the disparity does harm and GradNet which slopes help.
+    The regressor is frozen. The refinement is solved to the preset's tolerance, and its derivative comes from the
+    implicit function theorem. So ConfNet learns where the disparity does harm, and GradNet which gradients help.
     """
 
     monitor = "validation/refined_epe"
     network: JointHeads
+    """The two networks that are trained."""
 
     def __init__(
         self,
@@ -60,21 +62,32 @@ class JointTask(HeadTask):
         steps: int,
         seed: int,
     ) -> None:
+        """As `HeadTask`, with the networks to train and the refinement to train them through."""
         super().__init__(preset, regressor, steps, seed)
         self.network = network
         self.refinement = refinement
         self.losses = preset
 
-    def inputs(self, batch: Batch) -> HeadInputs:
-        """What the two networks see, from the regressor run once."""
+    def inputs(self, batch: StereoBatch) -> HeadInputs:
+        """The inputs of both networks for a batch of crops; the regressor runs once."""
         heads = self.network
         with torch.no_grad():
-            return head_inputs(self.regressor, heads.confnet, heads.gradnet, batch["left"], batch["right"])
+            return head_inputs(self.regressor, heads.confnet, heads.gradnet, batch.left, batch.right)
 
     def refine(self, image: Tensor, disparity: Tensor, logits: Tensor, gradient: Tensor) -> Tensor:
-        """The refined disparity (B, 1, H, W), differentiable in ConfNet's logits and GradNet's gradient."""
+        """Refine a disparity, differentiably in the networks' outputs.
+
+        Args:
+            image: (B, 3, H, W) in 0..1.
+            disparity: (B, 1, H, W) px.
+            logits: (B, 2, H, W), ConfNet's.
+            gradient: (B, 2, H, W) px per px, GradNet's.
+
+        Returns:
+            (B, 1, H, W) px.
+        """
         shape = self.refinement.shape
-        # `ConfidenceShape.apply` of softmax(logits)[1], without ever leaving the logarithms.
+        # `ConfidenceShape.apply` of softmax(logits)[1], computed in logarithms to keep its digits.
         log_confidence = F.logsigmoid((logits[:, 1] - logits[:, 0]) / shape.temperature)
         return refine_batch(
             disparity[:, 0],
@@ -86,57 +99,56 @@ class JointTask(HeadTask):
             self.losses.tolerance,
         )[:, None]
 
-    def loss(self, batch: Batch) -> Tensor:
+    def loss(self, batch: StereoBatch) -> Tensor:
+        """The heads' own losses plus the weighted `refinement_l1` of a batch."""
         seen = self.inputs(batch)
         disparity = seen.regression.disparity
         logits, gradient = self.network.confnet(*seen.confnet), self.network.gradnet(*seen.gradnet)
         own = confidence_cross_entropy(
-            logits, disparity, batch["disparity"], self.losses.correct_within_px
-        ) + masked_gradient_l1(gradient, batch["gradient"], self.losses.gradient_threshold_px)
+            logits, disparity, batch.disparity, self.losses.correct_within_px
+        ) + masked_gradient_l1(gradient, batch.gradient, self.losses.gradient_threshold_px)
         if self.losses.refined_weight == 0:
             return own
-        refined = self.refine(batch["left"], disparity, logits, gradient)
+        refined = self.refine(batch.left, disparity, logits, gradient)
         through = refinement_l1(
             refined,
-            batch["disparity"],
-            batch["gradient"],
+            batch.disparity,
+            batch.gradient,
             self.losses.refined_gradient_weight,
             self.losses.gradient_threshold_px,
         )
         return own + self.losses.refined_weight * through
 
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        """Errors of the refined disparity, and the figures of both networks by themselves."""
         heads = self.kept_network
         disparity, confidence, gradient = estimate(
-            self.regressor, heads.confnet, heads.gradnet, batch["left"], batch["right"]
+            self.regressor, heads.confnet, heads.gradnet, batch.left, batch.right
         )
         assert confidence is not None
         assert gradient is not None
-        image, initial, trust, slopes = (
-            image_of(batch["left"]),
-            map_of(disparity),
-            map_of(confidence),
-            map_of(gradient),
-        )
-        solved = self.refinement.solve(initial, trust, slopes, image).disparity
+        solved = self.refinement.solve(
+            map_of(disparity), map_of(confidence), map_of(gradient), image_of(batch.left)
+        ).disparity
         refined = torch.from_numpy(solved).to(disparity)[None, None]
-        truth, threshold = batch["disparity"], self.losses.gradient_threshold_px
+        truth, threshold = batch.disparity, self.losses.gradient_threshold_px
         figures = {
             "refined_epe": end_point_error(refined, truth),
-            "refined_bad1": bad_rate(refined, truth, 1.0),
-            "refined_gradient": gradient_error(forward_differences(refined), batch["gradient"], threshold),
-            "gradient": gradient_error(gradient, batch["gradient"], threshold),
+            "refined_bad1": bad_pixel_rate(refined, truth, 1.0),
+            "refined_gradient": gradient_error(forward_gradient(refined), batch.gradient, threshold),
+            "gradient": gradient_error(gradient, batch.gradient, threshold),
             "auc": sparsification_auc(confidence, disparity, truth, self.losses.correct_within_px),
         }
         return figures, {"refined": refined, "confidence": confidence, "gradient": gradient}
 
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
-        nearest = max(float(torch.nan_to_num(batch["disparity"]).max()), 1.0)
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        """Image, refined disparity and its error, confidence and gradient."""
+        nearest = max(float(torch.nan_to_num(batch.disparity).max()), 1.0)
         return side_by_side(
             [
-                image_of(batch["left"]),
+                image_of(batch.left),
                 disparity_picture(map_of(maps["refined"]), nearest),
-                error_picture(map_of(maps["refined"] - batch["disparity"]), 1.0),
+                error_picture(map_of(maps["refined"] - batch.disparity), 1.0),
                 confidence_picture(map_of(maps["confidence"])),
                 gradient_picture(map_of(maps["gradient"])),
             ]

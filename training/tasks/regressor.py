@@ -1,4 +1,4 @@
-"""Training DispNetCorr1D: from scratch on the scales' schedule, and fine-tuning with eq. 9."""
+"""Training DispNetCorr1D: from scratch with losses at all scales, and fine-tuning with eq. 9."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import torch
 from torch import Tensor, nn
 
 from stereoforge_kit.viewing import Picture, disparity_picture, error_picture, side_by_side
-from training.data.pipeline import Batch
+from training.data.batch import StereoBatch
 from training.losses import gradient_aware_l1, multiscale_l1, stage_weights
-from training.metrics import bad_rate, end_point_error, forward_differences, gradient_error
+from training.metrics import bad_pixel_rate, end_point_error, forward_gradient, gradient_error
 from training.networks import DispNetCorr1D, full_resolution
-from training.prediction.inference import estimate
+from training.networks.inference import estimate
 from training.presets import FineTuningPreset, RegressorPreset
 from training.tasks.base import StereoTask, image_of, map_of
 
-SMOOTH_BELOW_PX = 1.0
-"""Gradient errors are reported where the true forward differences stay below this."""
+SMOOTH_WITHIN_PX = 1.0
+"""Gradient errors are reported where no true forward difference is above this."""
 
 
 class _DisparityTask(StereoTask):
@@ -25,25 +25,28 @@ class _DisparityTask(StereoTask):
     network: DispNetCorr1D
 
     def decayed_parameters(self) -> Iterable[nn.Parameter]:
+        """The weights of the encoder's convolutions."""
         return self.network.contracting_weights()
 
-    def validate_frame(self, batch: Batch) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-        disparity = estimate(self.kept_network, None, None, batch["left"], batch["right"]).disparity
-        truth = batch["disparity"]
+    def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
+        """End-point error, bad-pixel rates and gradient error of the disparity."""
+        disparity = estimate(self.kept_network, None, None, batch.left, batch.right).disparity
+        truth = batch.disparity
         figures = {
             "epe": end_point_error(disparity, truth),
-            "bad1": bad_rate(disparity, truth, 1.0),
-            "bad3": bad_rate(disparity, truth, 3.0),
-            "gradient": gradient_error(forward_differences(disparity), batch["gradient"], SMOOTH_BELOW_PX),
+            "bad1": bad_pixel_rate(disparity, truth, 1.0),
+            "bad3": bad_pixel_rate(disparity, truth, 3.0),
+            "gradient": gradient_error(forward_gradient(disparity), batch.gradient, SMOOTH_WITHIN_PX),
         }
         return figures, {"disparity": disparity}
 
-    def panel(self, batch: Batch, maps: dict[str, Tensor]) -> Picture:
-        truth, disparity = map_of(batch["disparity"]), map_of(maps["disparity"])
-        nearest = float(torch.nan_to_num(batch["disparity"]).max())
+    def panel(self, batch: StereoBatch, maps: dict[str, Tensor]) -> Picture:
+        """Image, true disparity, predicted disparity and its error."""
+        truth, disparity = map_of(batch.disparity), map_of(maps["disparity"])
+        nearest = float(torch.nan_to_num(batch.disparity).max())
         return side_by_side(
             [
-                image_of(batch["left"]),
+                image_of(batch.left),
                 disparity_picture(truth, max(nearest, 1.0)),
                 disparity_picture(disparity, max(nearest, 1.0)),
                 error_picture(disparity - truth, 1.0),
@@ -52,29 +55,33 @@ class _DisparityTask(StereoTask):
 
 
 class RegressorTask(_DisparityTask):
-    """Multi-scale L1 (Mayer et al. 2016)."""
+    """`regressor`: multi-scale L1 with a schedule of the scales' weights (Mayer et al. 2016)."""
 
     def __init__(self, preset: RegressorPreset, network: DispNetCorr1D, steps: int, seed: int) -> None:
+        """As `StereoTask`, with the network to train."""
         super().__init__(preset, steps, seed)
         self.network = network
         self.stages = preset.loss_stages
         self.stage_ends = [round(end * steps / preset.steps) for end in preset.stage_ends]
 
-    def loss(self, batch: Batch) -> Tensor:
-        predictions = self.network(batch["left"], batch["right"]).disparities
+    def loss(self, batch: StereoBatch) -> Tensor:
+        """`multiscale_l1` of a batch with the weights of the current step."""
+        predictions = self.network(batch.left, batch.right).disparities
         weights = stage_weights(self.global_step, self.stages, self.stage_ends)
-        return multiscale_l1(predictions, batch["disparity"], weights)
+        return multiscale_l1(predictions, batch.disparity, weights)
 
 
 class FineTuningTask(_DisparityTask):
-    """`regressor_f`: eq. 9 on the final disparity at full resolution."""
+    """`regressor_f`: eq. 9 on the finest disparity, at full resolution."""
 
     def __init__(self, preset: FineTuningPreset, network: DispNetCorr1D, steps: int, seed: int) -> None:
+        """As `StereoTask`, with the network to train."""
         super().__init__(preset, steps, seed)
         self.network = network
         self.gradient_weight = preset.gradient_weight
 
-    def loss(self, batch: Batch) -> Tensor:
-        finest = self.network(batch["left"], batch["right"]).disparities[-1]
-        prediction = full_resolution(finest, batch["left"].shape[-2:])
-        return gradient_aware_l1(prediction, batch["disparity"], self.gradient_weight)
+    def loss(self, batch: StereoBatch) -> Tensor:
+        """`gradient_aware_l1` of a batch."""
+        finest = self.network(batch.left, batch.right).disparities[-1]
+        prediction = full_resolution(finest, batch.left.shape[-2:])
+        return gradient_aware_l1(prediction, batch.disparity, self.gradient_weight)

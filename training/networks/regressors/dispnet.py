@@ -13,38 +13,40 @@ from torch import Tensor, nn
 from training.networks.correlation import Correlation1D
 
 LEAKY_SLOPE = 0.1
+"""Slope of LeakyReLU below zero (the original network definition)."""
 CONVOLUTION_WEIGHT = "0.weight"
-"""Name of the weight of the convolution in what `activated` returns."""
+"""Name of the convolution's weight in what `activated` returns."""
 STRIDE = 64
-"""Input sides must be multiples of this."""
+"""Width and height of the input must be multiples of this."""
 
 Normalization = Literal["none", "batch"]
+"""Of the convolutions: none, as in the original, or BatchNorm."""
 FeatureKind = Literal["joined", "decoded"]
-"""What "the last concatenated matching features" are: iconv1's input, as the words say, or its output."""
+"""What "the last concatenated matching features" of the paper are: iconv1's input, as the words say, or its output."""
 
 
 @dataclass(frozen=True)
 class DispNetConfig:
-    """What may vary about the network; the defaults are the published one."""
+    """Options of the network. The defaults are the original network definition; all else is ours."""
 
     width: float = 1.0
     """Factor on every channel count but the correlation's."""
     max_displacement: int = 40
-    """Reach of the correlation in pixels at 1/4 resolution."""
+    """Largest displacement of the correlation, in pixels at 1/4 resolution."""
     one_sided: bool = False
-    """Correlate towards non-negative disparities only: half the channels, nothing that could match is lost."""
+    """Correlate towards non-negative disparities only. That halves the channels and loses no possible match (ours)."""
     normalization: Normalization = "none"
-    """`batch` puts BatchNorm after every convolution but the predictions, which short runs need to converge."""
+    """`batch` puts BatchNorm after every convolution but the predictions; short runs need it to converge (ours)."""
     prediction_scale: float = 1.0
-    """Pixels a unit of a prediction layer's output stands for. The original predicts pixels directly (1); a
-    larger value lets a run of few steps reach tens of pixels with weights of ordinary size (ours)."""
+    """Pixels per unit of a prediction layer's output. The original predicts pixels (1). With a larger value a short run
+    reaches tens of pixels with weights of ordinary size (ours)."""
     residual: bool = False
-    """Predict at each scale what is to be added to the coarser scale's prediction, upsampled bilinearly, instead of
-    the disparity anew (ours; cascaded and FADNet-like networks do so)."""
+    """Predict at each scale the difference to the coarser scale's prediction, upsampled bilinearly, instead of the
+    disparity itself (ours; cascaded networks such as FADNet do so)."""
 
 
 class DispNetOutput(NamedTuple):
-    """What one pass gives."""
+    """The outputs of one forward pass."""
 
     disparities: tuple[Tensor, ...]
     """Six maps (B, 1, h, w) from 1/64 to 1/2 of the input, each in pixels of the input; not clipped at zero."""
@@ -52,17 +54,25 @@ class DispNetOutput(NamedTuple):
     """The last concatenated matching features, (B, F, H/2, W/2), F = 97 at full width: conv1 of the left view,
     upconv1, and as the last channel pr2 upsampled, in pixels."""
     decoded: Tensor
-    """What the finest prediction is made of: iconv1's answer to `features`, (B, 32 at full width, H/2, W/2)."""
+    """iconv1's output, from which the finest disparity is predicted, (B, 32 at full width, H/2, W/2)."""
 
 
 def scaled(channels: int, width: float) -> int:
+    """A channel count times a width factor, at least 1."""
     return max(1, round(channels * width))
 
 
 def activated(
     convolution: nn.Module, channels: int, normalization: Normalization, linear: bool = False
 ) -> nn.Sequential:
-    """A convolution with the network's normalisation and, unless linear, its LeakyReLU."""
+    """A convolution, the network's normalisation and, unless `linear`, LeakyReLU.
+
+    Args:
+        convolution: The layer.
+        channels: Its output channels.
+        normalization: As in `DispNetConfig`.
+        linear: Leave the LeakyReLU out.
+    """
     layers = [convolution]
     if normalization == "batch":
         layers.append(nn.BatchNorm2d(channels))
@@ -72,7 +82,10 @@ def activated(
 
 
 def upsampling(in_channels: int, channels: int) -> nn.ConvTranspose2d:
-    """Learned upsampling by two. The original gives it a bias of learning rate 0 that stays at 0."""
+    """A transposed convolution that doubles width and height.
+
+    The original gives it a bias with a learning rate of 0, which stays at 0.
+    """
     deconvolution = nn.ConvTranspose2d(in_channels, channels, 4, 2, 1)
     assert deconvolution.bias is not None
     deconvolution.bias.requires_grad_(False)
@@ -80,9 +93,17 @@ def upsampling(in_channels: int, channels: int) -> nn.ConvTranspose2d:
 
 
 class ExpandingStage(nn.Module):
-    """One step of the decoder: upsample features and prediction, join the skip, predict at twice the size."""
+    """One step of the decoder: upsample features and prediction, join the skip connection, predict anew."""
 
     def __init__(self, below: int, skip: int, channels: int, config: DispNetConfig) -> None:
+        """Make the layers.
+
+        Args:
+            below: Channels of the coarser features.
+            skip: Channels of the skip connection.
+            channels: Channels of this stage's features.
+            config: The network's options.
+        """
         super().__init__()
         normalization = config.normalization
         self.residual = config.residual
@@ -93,6 +114,17 @@ class ExpandingStage(nn.Module):
         self.pr = nn.Conv2d(channels, 1, 3, 1, 1)
 
     def forward(self, below: Tensor, prediction: Tensor, skip: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Decode one scale.
+
+        Args:
+            below: (B, below, h/2, w/2) features of the coarser scale.
+            prediction: (B, 1, h/2, w/2) of the coarser scale.
+            skip: (B, skip, h, w) from the encoder.
+
+        Returns:
+            Features (B, channels, h, w), prediction (B, 1, h, w), and the concatenation that the features were made
+            from.
+        """
         upsampled = in_full_precision(self.uppr, prediction)
         joined = torch.cat([skip, self.upconv(below), upsampled], dim=1)
         features = self.iconv(joined)
@@ -103,16 +135,27 @@ class ExpandingStage(nn.Module):
 
 
 class DispNetCorr1D(nn.Module):
-    """Disparity from a rectified pair: two shared convolutions, a 1-D correlation, an hourglass.
+    """Disparity from a rectified pair: two shared convolutions, a 1-D correlation, an encoder and a decoder.
 
-    `DispNetCorr1D()` is the network as released: 42,430,107 parameters, of which 997 are the deconvolutions'
-    biases, frozen at zero. The original regresses negative numbers clipped at zero; this is the same network
-    with the sign turned, so the loss and the user take relu(prediction).
+    `DispNetCorr1D()` is the network as its authors released it (Mayer et al., CVPR 2016): 42,430,107 parameters, of
+    which 997 are the transposed convolutions' biases, frozen at zero. The original predicts negative numbers, clipped
+    at zero; this is the same network with the opposite sign, so the loss and the user take relu(prediction).
+
+    Examples:
+        >>> network = DispNetCorr1D(DispNetConfig(width=0.0625)).eval()
+        >>> left, right = torch.rand(2, 1, 3, 64, 128)
+        >>> output = network(left, right)
+        >>> [tuple(disparity.shape[-2:]) for disparity in output.disparities]
+        [(1, 2), (2, 4), (4, 8), (8, 16), (16, 32), (32, 64)]
+        >>> output.features.shape
+        torch.Size([1, 7, 32, 64])
     """
 
     image_mean: Tensor
+    """(3,) mean colour of the training set in 0..1, which is subtracted from both images."""
 
     def __init__(self, config: DispNetConfig | None = None) -> None:
+        """Make the network with new weights; without a config, the original's."""
         super().__init__()
         self.config = config = config or DispNetConfig()
 
@@ -144,7 +187,8 @@ class DispNetCorr1D(nn.Module):
         initialize(self)
 
     def contracting_weights(self) -> list[nn.Parameter]:
-        """Weights of the contracting part's convolutions, the only ones the original decays."""
+        """Weights of the encoder's convolutions (the contracting part), the only ones with weight decay in the
+        original."""
         parts = [self.conv1, self.conv2, self.conv_redir, self.conv3, self.conv3_1, self.conv4, self.conv4_1]
         parts += [self.conv5, self.conv5_1, self.conv6, self.conv6_1]
         return [p for part in parts for name, p in part.named_parameters() if name == CONVOLUTION_WEIGHT]
@@ -156,7 +200,7 @@ class DispNetCorr1D(nn.Module):
             left, right: (B, 3, H, W) in 0..1, H and W multiples of 64.
 
         Raises:
-            ValueError: other sizes.
+            ValueError: the images differ in size, or a size is no multiple of 64.
         """
         if left.shape != right.shape or left.shape[-1] % STRIDE or left.shape[-2] % STRIDE:
             raise ValueError(
@@ -190,15 +234,17 @@ class DispNetCorr1D(nn.Module):
 
 
 def in_full_precision(layer: nn.Module, maps: Tensor) -> Tensor:
-    """A layer that makes pixels of disparity, in 32 bits under mixed precision too: 16 bits hold a disparity of 100
-    to half a pixel."""
+    """Run a layer that outputs disparity with 32 bits, under mixed precision too.
+
+    bfloat16 would store a disparity of 100 px with an error of up to a quarter of a pixel.
+    """
     with torch.autocast(maps.device.type, enabled=False):
         result: Tensor = layer(maps.float())
     return result
 
 
 def initialize(network: nn.Module) -> None:
-    """MSRA initialisation as Caffe does it (normal, variance 2 / fan-in of the weight blob), biases zero."""
+    """Initialise all convolutions as Caffe's MSRA filler does: normal, variance 2 / fan-in; biases 0."""
     for layer in network.modules():
         if isinstance(layer, nn.Conv2d | nn.ConvTranspose2d):
             nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
@@ -207,5 +253,16 @@ def initialize(network: nn.Module) -> None:
 
 
 def full_resolution(disparity: Tensor, size: Sequence[int]) -> Tensor:
-    """Bring a prediction (B, 1, h, w) to (B, 1, H, W), bilinearly: values are pixels of the input already."""
+    """Resize a prediction (B, 1, h, w) to (B, 1, H, W) bilinearly.
+
+    The values stay as they are: every scale predicts in pixels of the input.
+
+    Args:
+        disparity: (B, 1, h, w) px of the input.
+        size: (H, W).
+
+    Examples:
+        >>> full_resolution(torch.full((1, 1, 2, 3), 7.0), (4, 6)).unique()
+        tensor([7.])
+    """
     return F.interpolate(disparity, size=tuple(size), mode="bilinear", align_corners=False)
