@@ -1,4 +1,4 @@
-"""The code of docs/extending.md, run as it stands there."""
+"""The code of docs/howto/extend.md, run as it stands there."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from refine.method import EvaluationFrame
 from scenes import scene_from_json, scene_to_json
 from scenes.random_draws import integer
 
-PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
+PAGE = Path(__file__).parents[2] / "docs" / "howto" / "extend.md"
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
 
