@@ -1,6 +1,7 @@
 # make demo    everything at small scale, from nothing to a report      make test    the whole test suite
 # make install only the environment                                     make check   lint, types, import rules
 # make study   the numbers in results/ again, hours: recipes/study.yaml
+# make docs    the documentation site, build/docs/index.html; INTERSPHINX=1 links numpy's, torch's and trimesh's pages
 #
 # All of them set up .venv first, from pinned versions. A machine with a GPU can bring its own torch:
 # make install PIP_FLAGS="--index-url ..." CONSTRAINTS=/dev/null
@@ -12,6 +13,7 @@ PIP_FLAGS ?=
 PYTEST_FLAGS ?= -n auto --dist loadfile
 DEMO ?= demo
 STUDY ?= study
+INTERSPHINX ?=
 BIN := .venv/bin
 # What Blender's library wants from the system, where it is not there already (Debian's names).
 BLENDER_LIBRARIES := libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libxext6 libsm6 libice6 libgl1
@@ -20,7 +22,7 @@ BLENDER_LIBRARIES := libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libxex
 PYTHON313 ?= python3.13
 BLENDER_5_2 := .venv-blender-5.2
 
-.PHONY: install demo study test check test-blender-5.2 clean
+.PHONY: install demo study test check docs test-blender-5.2 clean
 
 install: .venv/.installed
 
@@ -29,8 +31,8 @@ demo: .venv/.installed
 
 study: .venv/.installed
 	$(BIN)/stereoforge study --plan recipes/study.yaml --out $(STUDY)
-	rm -rf results && cp -R $(STUDY)/results results
-	@echo "the networks: $(STUDY)/runs; those in stereoforge/weights/ are of the flying_things there"
+	rm -rf results && cp -R $(STUDY)/results results && rm results/report.html
+	@echo "the report: $(STUDY)/results/report.html; the networks: $(STUDY)/runs (stereoforge/weights/ are flying_things')"
 
 test: .venv/.installed-dev
 	OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest $(PYTEST_FLAGS)
@@ -40,6 +42,9 @@ check: .venv/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: .venv/.installed-docs
+	INTERSPHINX=$(INTERSPHINX) $(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet docs build/docs
 
 test-blender-5.2: $(BLENDER_5_2)/.installed
 	OMP_NUM_THREADS=1 $(BLENDER_5_2)/bin/python -m pytest $(PYTEST_FLAGS) tests/scenes tests/datagen tests/stereoforge_kit/files tests/stereoforge_kit/viewing
@@ -63,6 +68,10 @@ $(BLENDER_5_2)/.installed: pyproject.toml constraints-blender-5.2.txt
 
 .venv/.installed-dev: .venv/.installed
 	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable '.[all,dev]'
+	@touch $@
+
+.venv/.installed-docs: .venv/.installed
+	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable '.[all,docs]'
 	@touch $@
 
 .PHONY: blender-libraries

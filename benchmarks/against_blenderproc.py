@@ -40,7 +40,7 @@ from datagen.blender.camera import render_view
 from datagen.blender.session import CyclesSettings, quiet, start_empty_file
 from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.curation import Curation
 from datagen.recipe.recipe import write_recipe
 from datagen.rendering.exposure import automatic_exposure, develop
@@ -76,7 +76,7 @@ def recipe_of(scenes: int, width: int, height: int) -> Recipe:
 def hand_over(scene: Scene, path: Path) -> None:
     """Save a scene as StereoForge builds it, pictures included, as a .blend file."""
     with quiet(path.with_suffix(".log")):
-        place(build_world(SceneGeometry(scene), start_empty_file(CyclesSettings())), "left", 0.0)
+        place(build_world(build_geometry(scene), start_empty_file(CyclesSettings())), "left", 0.0)
         for image in bpy.data.images:
             image.pack()
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -97,7 +97,7 @@ def camera_of(scene: Scene) -> dict[str, object]:
 def left_radiance(scene: Scene, samples: int, denoise: bool, scratch: Path) -> NDArray[np.float32]:
     with quiet(scratch / "blender.log"):
         world = build_world(
-            SceneGeometry(scene), start_empty_file(CyclesSettings(samples, threads=os.cpu_count() or 1))
+            build_geometry(scene), start_empty_file(CyclesSettings(samples, threads=os.cpu_count() or 1))
         )
         world.blender_scene.cycles.use_denoising = denoise
         return render_view(world, "left", 0, scratch)
@@ -224,7 +224,7 @@ def _results(process: subprocess.Popen[str]) -> list[dict]:
 
 
 def _left_picture(python: Path, path: Path) -> NDArray[np.float32]:
-    """(H, W, 3) radiance of the left eye. HDF5 is read by BlenderProc's Python: ours has no use for it."""
+    """(H, W, 3) radiance of the left view. HDF5 is read by BlenderProc's Python: ours has no use for it."""
     code = (
         "import h5py, numpy, sys; colors = numpy.asarray(h5py.File(sys.argv[1])['colors'], 'f4'); "
         "numpy.save(sys.argv[2], colors[0])"

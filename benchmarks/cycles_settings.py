@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from datagen.blender.build import build_world
 from datagen.blender.camera import render_view
 from datagen.blender.session import CyclesSettings, quiet, start_empty_file
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.rendering.exposure import automatic_exposure, develop
 from scenes import FAMILIES, Scene, sample_scene
 
@@ -65,10 +65,10 @@ VARIANTS = (
 
 
 def render(scene: Scene, variant: Variant, scratch: Path) -> tuple[NDArray[np.float32], float]:
-    """Linear radiance of the left eye at the first frame, and the CPU seconds it took once the world stood."""
+    """Linear radiance of the left view at the first frame, and the CPU seconds it took once the world stood."""
     with quiet(scratch / "blender.log"):
         blender_scene = start_empty_file(CyclesSettings(samples=variant.samples))
-        world = build_world(SceneGeometry(scene), blender_scene)
+        world = build_world(build_geometry(scene), blender_scene)
         for owner, changes in (
             (blender_scene.cycles, variant.cycles),
             (blender_scene.world.cycles, variant.world),

@@ -40,7 +40,7 @@ import numpy as np
 
 from benchmarks.corruption import READERS, damage, make_examples
 from datagen import Recipe, StereoDataset, render_dataset
-from datagen.dataset.layout import EYES
+from datagen.dataset.layout import VIEWS
 from datagen.dataset.samples import StereoSample
 from datagen.dataset.shards import shard_index
 from datagen.errors import DatasetError, DiskFullError
@@ -50,7 +50,7 @@ from datagen.recipe.recipe import write_recipe
 from datagen.sources import webdataset
 from datagen.sources.registry import open_source
 from datagen.sources.stereo_frame import StereoFrame
-from datagen.verify.run import verify_dataset
+from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, scene_to_json
 from stereoforge_kit.files import open_tree
 from stereoforge_kit.processes import Limits, WorkerError, WorkerProcess
@@ -300,7 +300,7 @@ def export(root: Path, kind: str, out: Path) -> dict[str, str]:
 
 def digest_of(sample: StereoSample) -> str:
     """Of every array, and of the scene."""
-    arrays = [array for eye in EYES for array in astuple(sample.view(eye))]
+    arrays = [array for view in VIEWS for array in astuple(sample.view(view))]
     text = scene_to_json(sample.scene_record)
     return hashlib.sha256(b"".join(map(np.ndarray.tobytes, arrays)) + text.encode()).hexdigest()
 

@@ -1,4 +1,4 @@
-"""How a world becomes a sample: scenes rendered in Blender, exact ground truth, data sets on disk."""
+"""From scenes to data sets: pictures rendered in Blender, exact ground truth, and both on disk."""
 
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.errors import DatasetError, FormatError

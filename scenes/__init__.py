@@ -1,4 +1,4 @@
-"""What is in the world: plain records, and the families that sample them. No Blender, no torch."""
+"""Scenes as plain records, and the families that sample them. Needs neither Blender nor torch."""
 
 from scenes.family import Family, FamilyConfig
 from scenes.registry import FAMILIES, sample_scene

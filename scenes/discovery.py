@@ -1,4 +1,4 @@
-"""Finding plug-in modules in a package, so that adding a file is all it takes to add a kind of thing."""
+"""Discovery of plug-ins: adding a module to a package is all it takes to add a kind of thing."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ T = TypeVar("T")
 def modules_in(package: ModuleType) -> list[ModuleType]:
     """The modules of a package and of its sub-packages, in alphabetical order of their own names.
 
-    Sampling draws by position, so the order must not depend on the file system; and since a module's folder does not
-    count, moving it to another sub-package leaves every scene as it was.
+    Sampling draws by position, so the order must not depend on the file system. A module's folder does not
+    count either, so that moving it to another sub-package leaves every scene unchanged.
     """
     found = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
     names = [module.name for module in found if not module.ispkg]
@@ -29,7 +29,7 @@ def _own_name(module: str) -> str:
 def concrete_subclasses(package: ModuleType, base: type[T]) -> dict[str, type[T]]:
     """Every instantiable subclass of `base` defined in the package's modules, by class name.
 
-    Raises TypeError for two of one name: files say which kind a record is by name alone.
+    Raises TypeError for two of one name, because files tell kinds apart by name alone.
     """
     found: dict[str, type[T]] = {}
     for module in modules_in(package):

@@ -1,4 +1,4 @@
-"""What a family of worlds is: a name, a typed config and a sampler."""
+"""A family of scenes: a name, a typed config and a sampler."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from scenes.random_draws import Count, Range
 from scenes.spec import Scene
 from scenes.user_assets.pool import AssetPool
 from scenes.user_assets.replacement import Replaceable
+from stereoforge_kit.errors import InputError
 
 EMPTIEST = 0.1
 """What is left of a family's crowd at complexity 0."""
@@ -24,15 +25,18 @@ def crowd_share(complexity: float) -> float:
 
 @dataclass(frozen=True)
 class FamilyConfig:
-    """What every family lets the user choose; each family's own config adds its ranges."""
+    """The settings that all families share; each family's own config adds its ranges.
+
+    Raises ValueError for settings that no family can sample.
+    """
 
     crowd: ClassVar[tuple[str, ...]] = ()
-    """Ranges of how many things there are, which a lower complexity lowers."""
+    """Names of the fields that hold numbers of things; a lower complexity lowers them."""
     sparsity: ClassVar[tuple[str, ...]] = ()
-    """Ranges of how far apart things are, which a lower complexity raises."""
+    """Names of the fields that hold distances between things; a lower complexity raises them."""
 
     depths_for_range: ClassVar[bool] = False
-    """Whether a range of disparities is met by where things are put, so that the baseline needs no choosing."""
+    """Whether a range of disparities is reached by choosing depths, so that the baseline need not change."""
 
     width: int = 960
     """Image width, pixels."""
@@ -42,23 +46,27 @@ class FamilyConfig:
     """Frames per scene."""
 
     def __post_init__(self) -> None:
-        """Raises ValueError for what no family can sample; a family's own checks come after these."""
+        """The checks that all families share; a family adds its own after these."""
         for name, kind in _numbers(type(self)).items():
             given = getattr(self, name)
             values = given if isinstance(given, tuple) else (given,)
             if not np.isfinite(values).all():
-                raise ValueError(f"{name} must be finite, got {given}")
+                raise InputError(f"{name} must be finite, got {given}")
             if kind in (Range, Count) and values[0] > values[1]:
-                raise ValueError(f"{name} must be (low, high), got {given}")
+                raise InputError(f"{name} must be (low, high), got {given}")
             if kind == Count and values[0] < 0:
-                raise ValueError(f"{name} must not be negative, got {given}")
+                raise InputError(f"{name} must not be negative, got {given}")
             if kind is float and name.endswith("_share") and not 0 <= given <= 1:
-                raise ValueError(f"{name} must be in 0..1, got {given}")
+                raise InputError(f"{name} must be in 0..1, got {given}")
         if self.frames < 1:
-            raise ValueError(f"frames must be at least 1, got {self.frames}")
+            raise InputError(f"frames must be at least 1, got {self.frames}")
 
     def with_assets(self, assets: AssetPool) -> Self:  # noqa: ARG002
-        """This config for a family that draws the user's files while it samples; others have theirs replaced."""
+        """This config with the user's files, for a family that draws them while it samples.
+
+        Other families return the config unchanged: their scenes get user assets afterwards
+        (`scenes.user_assets.replacement`).
+        """
         return self
 
     def within_disparities(self, least_px: float, greatest_px: float) -> Self:  # noqa: ARG002
@@ -67,7 +75,7 @@ class FamilyConfig:
         Raises ValueError for a range that the family's worlds cannot have.
         """
         if least_px > 0:
-            raise ValueError(
+            raise InputError(
                 f"worlds of {type(self).__name__} reach to the horizon, so the least disparity can only be 0, "
                 f"not {least_px:g}"
             )
@@ -79,9 +87,9 @@ class FamilyConfig:
         Raises ValueError for a complexity outside 0..1, or for a family that names nothing to have fewer of.
         """
         if not 0 <= complexity <= 1:
-            raise ValueError(f"complexity must be from 0 to 1, got {complexity}")
+            raise InputError(f"complexity must be from 0 to 1, got {complexity}")
         if complexity < 1 and not self.crowd and not self.sparsity:
-            raise ValueError(f"{type(self).__name__} names no crowd that a curriculum could make smaller")
+            raise InputError(f"{type(self).__name__} names no crowd that a curriculum could make smaller")
         factor = crowd_share(complexity)
         changes: dict[str, Any] = {name: _scaled(getattr(self, name), factor) for name in self.crowd}
         changes |= {name: _scaled(getattr(self, name), 1 / factor) for name in self.sparsity}
@@ -96,7 +104,7 @@ def _numbers(config: type[FamilyConfig]) -> dict[str, Any]:
 
 
 def _scaled(limits: tuple[float, float], factor: float) -> tuple[float, float]:
-    """A range made smaller or larger; of whole numbers, one of anything there was is left."""
+    """A range multiplied by a factor; in a range of counts, what was at least one stays at least one."""
     if isinstance(limits[0], int):
         low, high = (max(min(limit, 1), round(limit * factor)) for limit in limits)
         return low, high
@@ -105,16 +113,16 @@ def _scaled(limits: tuple[float, float], factor: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Family:
-    """One kind of world."""
+    """A family of scenes, as the registry knows it."""
 
     name: str
     config: type[FamilyConfig]
     sample: Callable[[np.random.Generator, Any], Scene]
     """Draws one scene from a generator and an instance of `config`."""
     replaceable: Replaceable | None = None
-    """What may be the user's own; None where the family draws it itself (`with_assets`)."""
+    """What user assets may replace; None where the family draws them itself (`FamilyConfig.with_assets`)."""
 
     @property
     def takes_assets(self) -> bool:
-        """Whether its worlds can show the user's own files."""
+        """Whether its scenes can show user assets."""
         return self.replaceable is not None or self.config.with_assets is not FamilyConfig.with_assets

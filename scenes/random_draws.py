@@ -1,4 +1,4 @@
-"""Drawing plain Python numbers from a generator: what records store must survive JSON unchanged."""
+"""Random draws as plain Python numbers, because what records store must survive JSON unchanged."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ Count = tuple[int, int]
 
 
 def uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """Uniform over low .. high."""
     return float(rng.uniform(low, high))
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """Uniform in the logarithm, for sizes and other quantities that vary over decades."""
+    """Log-uniform over low .. high, for sizes and other quantities that vary over decades."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
@@ -30,6 +31,7 @@ def integer(rng: np.random.Generator, low: int, high: int) -> int:
 
 
 def chance(rng: np.random.Generator, probability: float) -> bool:
+    """True with a probability."""
     return bool(rng.random() < probability)
 
 
@@ -43,5 +45,5 @@ def choose(rng: np.random.Generator, options: Sequence[T], weights: Sequence[flo
 
 
 def new_seed(rng: np.random.Generator) -> int:
-    """A seed for a record's own noise; below 2^53 so that every JSON reader keeps it exactly."""
+    """A seed for a record's own noise, below 2^53 so that every JSON reader keeps it exactly."""
     return int(rng.integers(2**53))

@@ -1,4 +1,4 @@
-"""The families of worlds. A new family is one new module in `scenes.families` with a `FAMILY` in it."""
+"""The families of scenes. A new family is one new module in `scenes.families` with a `FAMILY` in it."""
 
 from __future__ import annotations
 
@@ -9,25 +9,28 @@ from scenes.discovery import modules_in
 from scenes.family import Family, FamilyConfig
 from scenes.spec import Scene
 from scenes.user_assets.pool import AssetPool
-from scenes.user_assets.replacement import with_own_content
+from scenes.user_assets.replacement import with_user_assets
+from stereoforge_kit.errors import InputError
 
 FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in modules_in(scenes.families)}
+"""Every family by name."""
 
 
 def sample_scene(
     rng: np.random.Generator, family: str, config: FamilyConfig | None = None, assets: AssetPool | None = None
 ) -> Scene:
-    """Draw a random scene of a family, of the user's own files too if there are `assets`.
+    """Sample a random scene of a family; with `assets`, some of it is made from the user's files.
 
-    The same generator state, family and config give the same scene on any machine. Raises ValueError for
-    a family that does not exist or a config of another family.
+    The same generator state, family, config and assets give the same scene on any machine. `config` is the
+    family's default if it is None. Raises ValueError for a family that does not exist and for a config of
+    another family.
     """
     if family not in FAMILIES:
-        raise ValueError(f"there is no scene family {family!r}; there are {', '.join(sorted(FAMILIES))}")
+        raise InputError(f"there is no scene family {family!r}; there are {', '.join(sorted(FAMILIES))}")
     kind = FAMILIES[family]
     config = kind.config() if config is None else config
     if not isinstance(config, kind.config):
-        raise ValueError(f"{family} takes a {kind.config.__name__}, not a {type(config).__name__}")
+        raise InputError(f"{family} takes a {kind.config.__name__}, not a {type(config).__name__}")
     assets = AssetPool() if assets is None else assets
     scene = kind.sample(rng, config.with_assets(assets))
-    return with_own_content(rng, scene, assets, kind.replaceable) if kind.replaceable else scene
+    return with_user_assets(rng, scene, assets, kind.replaceable) if kind.replaceable else scene

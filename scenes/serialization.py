@@ -1,4 +1,4 @@
-"""Scenes and configs to plain JSON-able data and back.
+"""Scenes and configs as plain data that JSON and YAML can hold, and back.
 
 Shapes, textures and lights are written with their class name under "kind"; reading accepts only names that
 are registered subclasses, so a scene file can build data but never run code.
@@ -24,11 +24,12 @@ from scenes.family import FamilyConfig
 from scenes.registry import FAMILIES
 from scenes.spec import Deformation, Light, Scene, Shape, Texture
 from scenes.user_assets.pool import USER_SHAPES, USER_TEXTURES
+from stereoforge_kit.errors import InputError
 
 T = TypeVar("T")
 
 OMIT_DEFAULT = {"omit_default": True}
-"""Metadata of a field that is written only where it is not its default, so that records without it read as ever."""
+"""Metadata of a field that is written only where it differs from its default."""
 
 
 def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str = "kind") -> None:
@@ -38,7 +39,7 @@ def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str
     def structure(data: Any, _: Any) -> Any:
         kind = kinds.get(str(data.get(tag))) if isinstance(data, dict) else None
         if kind is None:
-            raise ValueError(
+            raise InputError(
                 f"a {base.__name__} needs {tag!r}, one of {', '.join(kinds)}; got {str(data)[:80]!r}"
             )
         return converter.structure({key: value for key, value in data.items() if key != tag}, kind)
@@ -82,20 +83,24 @@ _converter = _make_converter()
 def to_plain(record: Any, kind: Any = None) -> Any:
     """A record as dicts, lists, strings and numbers, ready for JSON or YAML.
 
-    Give `kind` where the reader will ask for a base class, so that the record's own class is written down.
+    Give the base class as `kind` where the reader will ask for it, so that the record's own class is written
+    too.
     """
     return json.loads(json.dumps(_converter.unstructure(record, kind)))
 
 
 def from_plain(data: Any, kind: type[T]) -> T:
-    """The record of type `kind` described by plain data. ValueError says which field is wrong and why."""
+    """The record of type `kind` that plain data describes.
+
+    Raises ValueError, which says which field is wrong and why.
+    """
     try:
         return _converter.structure(data, kind)
     except ClassValidationError as error:
         sentences = transform_error(error, path=kind.__name__, format_exception=_describe)
-        raise ValueError("; ".join(sentences)) from error
+        raise InputError("; ".join(sentences)) from error
     except (TypeError, KeyError, AttributeError) as error:
-        raise ValueError(f"{kind.__name__}: {error}") from error
+        raise InputError(f"{kind.__name__}: {error}") from error
 
 
 def _describe(error: BaseException, kind: type | None) -> str:
@@ -108,13 +113,14 @@ def _describe(error: BaseException, kind: type | None) -> str:
 
 
 def scene_to_json(scene: Scene) -> str:
+    """The scene as indented JSON text, which `scene_from_json` reads."""
     return json.dumps(_converter.unstructure(scene), indent=1)
 
 
 def scene_from_json(text: str) -> Scene:
-    """Raises ValueError with one sentence for text that is not a scene."""
+    """The scene that `scene_to_json` wrote. Raises ValueError with one sentence for any other text."""
     try:
         data = json.loads(text)
     except json.JSONDecodeError as error:
-        raise ValueError(f"not JSON: {error}") from error
+        raise InputError(f"not JSON: {error}") from error
     return from_plain(data, Scene)

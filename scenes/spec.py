@@ -7,7 +7,7 @@ same geometry and the same pixels on any machine. `scenes.serialization` turns i
 Frames of reference
 -------------------
 World: right-handed, z up, metres. Camera: x right, y up, looking along -z (Blender's and OpenGL's
-convention). The rig's pose is the left eye's; the right eye is `baseline_m` along the rig's own x axis.
+convention). The rig's pose is the left camera's; the right camera is `baseline_m` along the rig's own x axis.
 Time is in frames; frame k of a scene is the instant t = k, k = 0 .. frames - 1.
 """
 
@@ -24,6 +24,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from scenes.geometry.mesh import Mesh
+from stereoforge_kit.errors import InputError
 
 Vector = tuple[float, float, float]
 Color = tuple[float, float, float]
@@ -36,10 +37,10 @@ IDENTITY_ROTATION: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Shape(ABC):
-    """Parameters of one solid; subclasses in `scenes.shapes` each know one way to build a mesh."""
+    """Parameters of one solid. Each subclass in `scenes.shapes` builds one kind of mesh."""
 
     popularity: ClassVar[float] = 1.0
-    """How often samplers that take any shape draw this kind, relative to the others; 0 for never."""
+    """How often samplers of any kind of shape draw this one, relative to the others; 0 for never."""
 
     @classmethod
     @abstractmethod
@@ -48,15 +49,15 @@ class Shape(ABC):
 
     @abstractmethod
     def mesh(self) -> Mesh:
-        """Build the mesh, centred on the origin and filling the cube [-1, 1]^3 in its longest axis."""
+        """Build the mesh: centred on the origin, its longest axis spanning -1..1."""
 
 
 @dataclass(frozen=True)
 class Texture(ABC):
-    """Parameters of one image texture; subclasses in `scenes.textures` each know one way to paint it."""
+    """Parameters of one image texture. Each subclass in `scenes.textures` paints one kind of image."""
 
     popularity: ClassVar[float] = 1.0
-    """How often samplers that take any texture draw this kind, relative to the others; 0 for never."""
+    """How often samplers of any kind of texture draw this one, relative to the others; 0 for never."""
 
     @classmethod
     @abstractmethod
@@ -70,37 +71,38 @@ class Texture(ABC):
 
 @dataclass(frozen=True)
 class Deformation(ABC):
-    """A non-rigid motion of one mesh; subclasses in `scenes.motion.deformations` each know one way to bend it."""
+    """A non-rigid motion of one mesh. Each subclass in `scenes.motion.deformations` is one kind of motion."""
 
     @abstractmethod
     def deformed(self, vertices: NDArray[np.float64], time_frames: float) -> NDArray[np.float64]:
-        """Where the vertices (V, 3) of the shape's mesh are at an instant, in mesh coordinates.
+        """Vertices (V, 3) of the shape's mesh at rest to where they are at an instant, in mesh coordinates.
 
-        A pure function, smooth in time: vertex k stays the same point of the surface throughout.
+        A pure function, smooth in time. Vertex k is the same point of the surface at all times.
         """
 
 
 @dataclass(frozen=True)
 class Material:
-    """How a surface answers light: one base-colour texture and the scalars of a principled BSDF."""
+    """How a surface reflects light: a base-colour texture and the scalars of a principled BSDF."""
 
     color: Texture
     repeats: float = 1.0
     """How often the texture repeats over one unit of the mesh's texture coordinates."""
     roughness: float = 1.0
-    """0 a mirror, 1 chalk. At 1 with no metal, glass or light of its own the surface is purely diffuse."""
+    """0 a mirror, 1 chalk. Diffuse only at 1, without specular, metallic, transmission and emission."""
     specular: float = 0.0
     """Strength of the dielectric highlight, 0..1 (0.5 is common plastic)."""
     metallic: float = 0.0
+    """0 a dielectric, 1 a metal."""
     transmission: float = 0.0
-    """Share of light refracted through the surface; ground truth still sees the first surface."""
+    """Share of the light refracted through the surface. Ground truth is of the surface itself nonetheless."""
     emission: float = 0.0
-    """Radiance the surface gives off, times its colour."""
+    """Emitted radiance, multiplied by the base colour."""
 
 
 @lru_cache(maxsize=512)
 def _rotation_spline(times_frames: tuple[float, ...], rotations: tuple[Quaternion, ...]) -> RotationSpline:
-    """Slow to set up, and the parts of one thing all turn alike."""
+    """Kept, because it is slow to set up and all parts of one thing turn alike."""
     return RotationSpline(times_frames, Rotation.from_quat([(x, y, z, w) for w, x, y, z in rotations]))
 
 
@@ -116,7 +118,11 @@ def _turn_at(
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A smooth rigid motion through key poses: cubic spline of positions, rotation spline of attitudes."""
+    """A smooth rigid motion through key poses: cubic splines of positions, a rotation spline of attitudes.
+
+    Raises ValueError for no key pose, for unequal numbers of times, positions and rotations, and for times
+    that do not increase.
+    """
 
     times_frames: tuple[float, ...]
     positions_m: tuple[Vector, ...]
@@ -125,15 +131,16 @@ class Trajectory:
     def __post_init__(self) -> None:
         count = len(self.times_frames)
         if count == 0 or len(self.positions_m) != count or len(self.rotations) != count:
-            raise ValueError(
+            raise InputError(
                 f"a trajectory needs as many positions and rotations as times, and at least one; got "
                 f"{count} times, {len(self.positions_m)} positions, {len(self.rotations)} rotations"
             )
         if any(b <= a for a, b in zip(self.times_frames, self.times_frames[1:], strict=False)):
-            raise ValueError("a trajectory's times must increase")
+            raise InputError("a trajectory's times must increase")
 
     @classmethod
     def static(cls, position_m: Vector = (0.0, 0.0, 0.0), rotation: Quaternion = IDENTITY_ROTATION) -> Self:
+        """The trajectory of what does not move."""
         return cls(times_frames=(0.0,), positions_m=(position_m,), rotations=(rotation,))
 
     @cached_property
@@ -151,7 +158,7 @@ class Trajectory:
 
     @cached_property
     def _resting(self) -> NDArray[np.float64]:
-        """The only pose of what does not move; most things, and asked for many times."""
+        """The only pose of a static object; kept, because most objects are static and are asked many times."""
         pose = np.eye(4)
         w, x, y, z = self.rotations[0]
         pose[:3, :3] = Rotation.from_quat((x, y, z, w)).as_matrix()
@@ -159,7 +166,7 @@ class Trajectory:
         return pose
 
     def pose(self, time_frames: float) -> NDArray[np.float64]:
-        """The (4, 4) local-to-world matrix at an instant; held at the ends outside the key times."""
+        """The (4, 4) local-to-world matrix at an instant. Outside the key times the first or last pose is held."""
         if len(self.times_frames) == 1:
             return self._resting.copy()
         pose = np.eye(4)
@@ -171,7 +178,7 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class SceneObject:
-    """One thing in the world: a shape, scaled along its own axes, wearing a material, on a path."""
+    """One object of a scene: a shape, scaled along its own axes, with a material and a motion."""
 
     name: str
     shape: Shape
@@ -181,7 +188,7 @@ class SceneObject:
     scale_m: Vector = (1.0, 1.0, 1.0)
     """Half extents: the shape's cube [-1, 1]^3 becomes a box of twice this size."""
     deformation: Deformation | None = None
-    """How the mesh bends over time, before it is scaled and moved; None for a rigid thing."""
+    """How the mesh deforms over time, before it is scaled and moved; None for a rigid object."""
 
     def pose(self, time_frames: float) -> NDArray[np.float64]:
         """The (4, 4) matrix from mesh coordinates to the world, scale included."""
@@ -190,20 +197,23 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class StereoCamera:
-    """A rectified pair of pinhole cameras: square pixels, principal point in the middle, same focal length."""
+    """A rectified pair of pinhole cameras: square pixels, principal point in the middle, same focal length.
+
+    Raises ValueError for a size, focal length, baseline or sensor width that is not positive.
+    """
 
     width: int
     height: int
     focal_mm: float
     baseline_m: float
     motion: Trajectory
-    """Path of the left eye."""
+    """Path of the left camera."""
     sensor_width_mm: float = 32.0
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "focal_mm", "baseline_m", "sensor_width_mm"):
             if not getattr(self, name) > 0:
-                raise ValueError(f"a camera's {name} must be positive, got {getattr(self, name)}")
+                raise InputError(f"a camera's {name} must be positive, got {getattr(self, name)}")
 
     @property
     def focal_px(self) -> float:
@@ -215,20 +225,22 @@ class StereoCamera:
         """fx * B: disparity in pixels times depth in metres."""
         return self.focal_px * self.baseline_m
 
-    def pose(self, eye: str, time_frames: float) -> NDArray[np.float64]:
-        """The (4, 4) camera-to-world matrix of the "left" or "right" eye."""
+    def pose(self, view: str, time_frames: float) -> NDArray[np.float64]:
+        """The (4, 4) camera-to-world matrix of the "left" or "right" view; ValueError for any other name."""
         pose = self.motion.pose(time_frames)
-        if eye == "right":
+        if view == "right":
             pose[:3, 3] += pose[:3, 0] * self.baseline_m
-        elif eye != "left":
-            raise ValueError(f"an eye is 'left' or 'right', not {eye!r}")
+        elif view != "left":
+            raise InputError(f"a view is 'left' or 'right', not {view!r}")
         return pose
 
 
 @dataclass(frozen=True)
 class SunLight:
+    """A light at infinity."""
+
     direction: Vector
-    """Where the light travels to (world)."""
+    """Direction in which the light travels (world)."""
     color: Color
     irradiance: float
     """W/m^2 on a surface facing the sun."""
@@ -238,11 +250,15 @@ class SunLight:
 
 @dataclass(frozen=True)
 class AreaLight:
+    """A square lamp that shines from a position towards a target (world, metres)."""
+
     position_m: Vector
     target_m: Vector
     color: Color
     power_w: float
+    """Emitted power, watts."""
     size_m: float
+    """Side of the square."""
 
 
 Light = SunLight | AreaLight
@@ -250,7 +266,7 @@ Light = SunLight | AreaLight
 
 @dataclass(frozen=True)
 class World:
-    """What surrounds everything, at infinity: an equirectangular picture that also lights the scene."""
+    """The environment, at infinity: an equirectangular texture that also lights the scene."""
 
     environment: Texture
     strength: float = 1.0
@@ -258,10 +274,10 @@ class World:
 
 @dataclass(frozen=True)
 class Fog:
-    """Homogeneous haze: over a distance of `visibility_m` the share 1/e of a surface's light is left."""
+    """Homogeneous fog: over a distance of `visibility_m` a surface's light falls to 1/e."""
 
     color: Color
-    """What infinitely deep fog looks like in the picture, linear RGB, 0..1 (after exposure)."""
+    """Colour of infinitely deep fog in the image, linear RGB, 0..1 (after exposure)."""
     visibility_m: float
 
 
@@ -281,14 +297,17 @@ class FinalPass:
     vignetting: float = 0.0
     """Share of the light lost in the corners, 0..1."""
     exposure_difference_ev: float = 0.0
-    """The right eye's exposure against the left's, in stops."""
-    right_eye_color: Color = (1.0, 1.0, 1.0)
-    """The right eye's colour balance against the left's, gain an RGB channel."""
+    """The right view's exposure relative to the left's, in stops."""
+    right_view_color: Color = (1.0, 1.0, 1.0)
+    """The right view's colour balance relative to the left's: a gain for each RGB channel."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A world, the rig that looks at it, and how many frames it is watched for."""
+    """A world, the stereo rig that looks at it, and the number of frames.
+
+    Raises ValueError for an object whose material index is out of range.
+    """
 
     family: str
     frames: int
@@ -298,14 +317,14 @@ class Scene:
     lights: tuple[Light, ...]
     world: World
     exposure_key: float = 0.18
-    """The image's mean reflectance-like level after automatic exposure, linear, 0..1 (0.18 is middle grey)."""
+    """Mean level of the image after automatic exposure, linear, 0..1 (0.18 is middle grey)."""
     final: FinalPass = field(default_factory=FinalPass)
     notes: dict[str, float] = field(default_factory=dict)
-    """Numbers the sampler wants kept beside the scene (not used for rendering)."""
+    """Numbers that the sampler records beside the scene. Rendering does not use them."""
 
     def __post_init__(self) -> None:
         for thing in self.objects:
             if not 0 <= thing.material < len(self.materials):
-                raise ValueError(
-                    f"object {thing.name!r} wears material {thing.material} of {len(self.materials)}"
+                raise InputError(
+                    f"object {thing.name!r} has material {thing.material} of {len(self.materials)}"
                 )

@@ -1,4 +1,4 @@
-"""The only folder that talks to Blender: a Scene in, rendered arrays and evaluated triangles out."""
+"""The only folder that imports bpy: it builds a Scene in Blender and renders it to arrays."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A Scene record to Blender objects."""
+"""Building a Scene record as objects of the open Blender file."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from scenes.user_assets.pool import UserEnvironment
 
 @dataclass(frozen=True)
 class BuiltWorld:
-    """A Scene standing in the open Blender file."""
+    """A Scene that is built in the open Blender file."""
 
     scene: Scene
     geometry: SceneGeometry
     blender_scene: bpy.types.Scene
     camera: bpy.types.Object
-    """One camera, moved from eye to eye."""
+    """One camera, moved from view to view."""
     objects: tuple[bpy.types.Object, ...]
     """In the order of `Scene.objects`."""
     deformed_at: dict[int, float] = field(default_factory=dict)
@@ -35,7 +35,7 @@ class BuiltWorld:
 def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> BuiltWorld:
     """Build everything in the geometry's scene into an empty Blender file."""
     scene = geometry.scene
-    # Families draw some materials that no object happens to wear: painting those would be for nothing.
+    # Families sample some materials that no object has: painting those would be for nothing.
     worn = sorted({thing.material for thing in scene.objects})
     materials = {k: build_material(f"material_{k}", scene.materials[k]) for k in worn}
     objects = _build_objects(geometry, materials, blender_scene)
@@ -46,23 +46,23 @@ def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> Buil
     return BuiltWorld(scene, geometry, blender_scene, camera, objects)
 
 
-def place(world: BuiltWorld, eye: str, time_frames: float) -> None:
-    """Put every object, and the camera for one eye, where they are at an instant, deformed as they are then."""
+def place(world: BuiltWorld, view: str, time_frames: float) -> None:
+    """Place every object, deformed, and the camera of one view as they are at an instant."""
     for index, (thing, block) in enumerate(zip(world.scene.objects, world.objects, strict=True)):
         if len(thing.motion.times_frames) > 1:
             block.matrix_world = Matrix(thing.pose(time_frames).tolist())
-        # The second eye sees the same instant: moved again, its mesh would be handed to Cycles again.
+        # The second view shows the same instant: moved again, the mesh would be handed to Cycles again.
         if thing.deformation is not None and world.deformed_at.get(index) != time_frames:
             world.deformed_at[index] = time_frames
             _move_vertices(block.data, world.geometry.local_vertices(index, time_frames))
-    world.camera.matrix_world = Matrix(world.scene.camera.pose(eye, time_frames).tolist())
+    world.camera.matrix_world = Matrix(world.scene.camera.pose(view, time_frames).tolist())
     bpy.context.view_layer.update()
 
 
 def _build_objects(
     geometry: SceneGeometry, materials: Mapping[int, bpy.types.Material], blender_scene: bpy.types.Scene
 ) -> tuple[bpy.types.Object, ...]:
-    """One Blender object each; rigid ones of the same shape and material are instances of one mesh."""
+    """One Blender object for each of the scene's. Rigid ones of the same shape and material share one mesh."""
     shared: dict[tuple[int, int], bpy.types.Mesh] = {}
     objects = []
     for index, thing in enumerate(geometry.scene.objects):
@@ -122,7 +122,7 @@ def _build_light(index: int, light: Light, blender_scene: bpy.types.Scene) -> No
     block = bpy.data.objects.new(lamp.name, lamp)
     block.location = position
     block.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
-    # Cycles would show the lamp's own glowing square to an eye that happens to look at it.
+    # Cycles would show the lamp's own glowing square to a camera that happens to look at it.
     block.visible_camera = False
     blender_scene.collection.objects.link(block)
 
@@ -150,14 +150,14 @@ def _build_environment(world: World, blender_scene: bpy.types.Scene) -> None:
 
 
 def _build_camera(camera: StereoCamera, blender_scene: bpy.types.Scene) -> bpy.types.Object:
-    lens = bpy.data.cameras.new("eye")
+    lens = bpy.data.cameras.new("camera")
     lens.sensor_fit = "HORIZONTAL"
     lens.sensor_width = camera.sensor_width_mm
     lens.lens = camera.focal_mm
-    # Anything in front of the eye counts: the nearest disparity allowed is the sampler's business.
+    # Anything in front of the camera counts: the sampler sees to the nearest disparity allowed.
     lens.clip_start = 1e-3
     lens.clip_end = 1e7
-    block = bpy.data.objects.new("eye", lens)
+    block = bpy.data.objects.new("camera", lens)
     block.rotation_mode = "QUATERNION"
     blender_scene.collection.objects.link(block)
     blender_scene.camera = block

@@ -1,4 +1,4 @@
-"""Rendering one eye at one instant, and reading what Cycles wrote."""
+"""Rendering one view at one instant, and reading the channels that Cycles writes."""
 
 from __future__ import annotations
 
@@ -12,24 +12,27 @@ from numpy.typing import NDArray
 from datagen.blender.build import BuiltWorld, place
 
 
-def render_view(world: BuiltWorld, eye: str, frame: int, scratch: Path) -> NDArray[np.float32]:
-    """(H, W, 3) scene-linear RGB of one eye of one frame, denoised.
+def render_view(world: BuiltWorld, view: str, frame: int, scratch: Path) -> NDArray[np.float32]:
+    """(H, W, 3) float32 scene-linear RGB of one view of one frame, denoised.
 
-    `scratch` is an existing folder for Blender's temporary file.
+    scratch: An existing folder for Blender's temporary file.
     """
-    place(world, eye, float(frame))
-    # The two eyes must not share their noise: the same pattern in both would match at disparity 0.
-    return render_radiance(world, f"{eye}_{frame}", 2 * frame + (eye == "right"), scratch)
+    place(world, view, float(frame))
+    # The two views must not share their noise: the same pattern in both would match at disparity 0.
+    return render_radiance(world, f"{view}_{frame}", 2 * frame + (view == "right"), scratch)
 
 
 def render_radiance(world: BuiltWorld, name: str, seed: int, scratch: Path) -> NDArray[np.float32]:
-    """(H, W, 3) scene-linear RGB of the world as it stands."""
+    """(H, W, 3) float32 scene-linear RGB of the world as it is placed now.
+
+    name: The temporary file's name in `scratch`. seed: That of Cycles' noise.
+    """
     channels = render_channels(world, name, seed, scratch)
     return np.stack([channels[f"Combined.{c}"] for c in "RGB"], axis=-1)
 
 
 def render_channels(world: BuiltWorld, name: str, seed: int, scratch: Path) -> dict[str, NDArray[np.float32]]:
-    """All channels Cycles makes, (H, W) each, by their names without the layer's."""
+    """All channels that Cycles makes, (H, W) float32 each, by their names without the layer's name."""
     world.blender_scene.cycles.seed = seed
     path = scratch / f"{name}.exr"
     world.blender_scene.render.filepath = str(path)

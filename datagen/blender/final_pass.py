@@ -1,7 +1,7 @@
 """The final pass: Cycles with the shutter open, a real lens and fog in every shader.
 
-Everything is put in place for one picture and taken away after it, so that clean pictures and ground truth
-come from the same untouched world whether a final pass is rendered or not.
+Everything is set up for one picture and removed after it. So clean pictures and ground truth come from the same world,
+whether a final pass is rendered or not.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from datagen.blender.build import BuiltWorld, place
 from datagen.blender.camera import render_radiance
-from datagen.dataset.layout import EYES, Eye
+from datagen.dataset.layout import VIEWS, View
 from scenes.spec import FinalPass, Fog
 
 SHUTTER_FRAME = 10
-"""The frame of Blender's clock on which the shutter interval is centred, whatever instant it shows."""
+"""The frame of Blender's clock on which the shutter interval is centred, whichever instant it shows."""
 HAZE_HEIGHT = 0.2
 """Height of the layer of haze before the sky, in visibilities: the zenith keeps exp(-0.2) of its light."""
 _FINAL_SEED = 1 << 20
@@ -30,10 +30,14 @@ _FINAL_SEED = 1 << 20
 
 def render_final(
     world: BuiltWorld, frame: int, exposure: float, scratch: Path
-) -> dict[Eye, NDArray[np.float32]]:
-    """(H, W, 3) scene-linear RGB of each eye with motion blur, defocus and fog.
+) -> dict[View, NDArray[np.float32]]:
+    """(H, W, 3) float32 scene-linear RGB of each view with motion blur, defocus and fog.
 
-    exposure: The factor the pictures will be exposed with, which the fog's colour is given after.
+    Args:
+        world: The world to render.
+        frame: The frame's number from 0, in the middle of the shutter interval.
+        exposure: The factor that the pictures will be exposed with. The fog's colour is that of the exposed picture.
+        scratch: An existing folder for Blender's temporary file.
     """
     final = world.scene.final
     with ExitStack() as stack:
@@ -41,15 +45,15 @@ def render_final(
             stack.enter_context(_lens(world, final))
         if final.fog is not None:
             stack.enter_context(_foggy(world, final.fog, exposure))
-        return {eye: _render_eye(world, eye, frame, scratch) for eye in EYES}
+        return {view: _render_view(world, view, frame, scratch) for view in VIEWS}
 
 
-def _render_eye(world: BuiltWorld, eye: Eye, frame: int, scratch: Path) -> NDArray[np.float32]:
-    place(world, eye, float(frame))
+def _render_view(world: BuiltWorld, view: View, frame: int, scratch: Path) -> NDArray[np.float32]:
+    place(world, view, float(frame))
     shutter_frames = world.scene.final.shutter_frames
-    with _open_shutter(world, eye, frame, shutter_frames) if shutter_frames > 0 else nullcontext():
-        seed = _FINAL_SEED + 2 * frame + (eye == "right")
-        return render_radiance(world, f"final_{eye}_{frame}", seed, scratch)
+    with _open_shutter(world, view, frame, shutter_frames) if shutter_frames > 0 else nullcontext():
+        seed = _FINAL_SEED + 2 * frame + (view == "right")
+        return render_radiance(world, f"final_{view}_{frame}", seed, scratch)
 
 
 @contextmanager
@@ -65,10 +69,10 @@ def _lens(world: BuiltWorld, final: FinalPass) -> Iterator[None]:
 
 
 @contextmanager
-def _open_shutter(world: BuiltWorld, eye: str, frame: int, shutter_frames: float) -> Iterator[None]:
-    """Key frames of everything that moves at the shutter's opening, middle and closing.
+def _open_shutter(world: BuiltWorld, view: str, frame: int, shutter_frames: float) -> Iterator[None]:
+    """Give everything that moves key frames at the shutter's opening, middle and closing.
 
-    Cycles takes the motion at those three instants and goes straight between them.
+    Cycles takes the motion at these three instants and interpolates linearly between them.
     """
     half = shutter_frames / 2
     keys = [(SHUTTER_FRAME + offset, frame + offset) for offset in (-half, 0.0, half)]
@@ -78,7 +82,7 @@ def _open_shutter(world: BuiltWorld, eye: str, frame: int, shutter_frames: float
         for thing, block in zip(world.scene.objects, world.objects, strict=True)
         if len(thing.motion.times_frames) > 1
     ]
-    moving.append((world.camera, [world.scene.camera.pose(eye, time) for _, time in keys]))
+    moving.append((world.camera, [world.scene.camera.pose(view, time) for _, time in keys]))
     deforming = [k for k, thing in enumerate(world.scene.objects) if thing.deformation is not None]
     try:
         for block, poses in moving:
@@ -98,7 +102,7 @@ def _open_shutter(world: BuiltWorld, eye: str, frame: int, shutter_frames: float
         for index in deforming:
             world.objects[index].shape_key_clear()
             world.deformed_at.pop(index, None)
-        place(world, eye, float(frame))
+        place(world, view, float(frame))
 
 
 def _key_poses(block: bpy.types.Object, poses: list[NDArray[np.float64]], clocks: list[float]) -> None:
@@ -114,7 +118,7 @@ def _key_poses(block: bpy.types.Object, poses: list[NDArray[np.float64]], clocks
 
 
 def _key_shapes(block: bpy.types.Object, shapes: list[NDArray[np.float64]], clocks: list[float]) -> None:
-    """The middle shape as the basis, and the other two coming and going."""
+    """Shape keys: the middle shape is the basis, and the other two are blended in and out."""
     opening, middle, closing = shapes
     block.shape_key_add(name="middle").data.foreach_set("co", middle.astype(np.float32).ravel())
     for shape, clock in ((opening, clocks[0]), (closing, clocks[2])):
@@ -127,10 +131,10 @@ def _key_shapes(block: bpy.types.Object, shapes: list[NDArray[np.float64]], cloc
 
 @contextmanager
 def _foggy(world: BuiltWorld, fog: Fog, exposure: float) -> Iterator[None]:
-    """Mix what the camera sees with the fog's colour by its distance, in the shaders themselves.
+    """Mix every surface with the fog's colour by its distance, in the shaders themselves and for camera rays only.
 
-    So each path through lens and shutter gets the fog of its own length, nothing needs to be composited, and
-    light is not dimmed on its way to the surfaces.
+    So each path through lens and shutter gets the fog of its own length, no compositing is needed, and light is not
+    dimmed on its way to the surfaces.
     """
     trees = [(block.node_tree, False) for block in bpy.data.materials if block.use_nodes]
     trees.append((world.blender_scene.world.node_tree, True))
@@ -148,7 +152,7 @@ _FogNodes = tuple[list[bpy.types.Node], bpy.types.NodeSocket, bpy.types.NodeSock
 
 
 def _add_fog(tree: bpy.types.NodeTree, fog: Fog, exposure: float, sky: bool) -> _FogNodes:
-    """Put fog before a shader; what was added, and the link it replaced."""
+    """Insert fog behind a shader; return the nodes added and the link that they replace."""
     (output,) = (
         node.inputs["Surface"] for node in tree.nodes if node.type in ("OUTPUT_MATERIAL", "OUTPUT_WORLD")
     )
@@ -169,7 +173,7 @@ def _add_fog(tree: bpy.types.NodeTree, fog: Fog, exposure: float, sky: bool) -> 
 
 
 def _through_distance(tree: bpy.types.NodeTree, visibility_m: float) -> bpy.types.NodeSocket:
-    """Share of a surface's light that reaches the eye: exp(-distance / visibility)."""
+    """Share of a surface's light that reaches the camera: exp(-distance / visibility)."""
     distance = tree.nodes.new("ShaderNodeCameraData").outputs["View Distance"]
     return _math(tree, "EXPONENT", _math(tree, "MULTIPLY", distance, -1.0 / visibility_m))
 

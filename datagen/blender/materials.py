@@ -1,4 +1,4 @@
-"""Material records to shader nodes: one picture and one of two BSDFs."""
+"""From material records to shader nodes: an image texture and one of two BSDFs."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from scenes.spec import Material
 
 
 def image_from_array(name: str, pixels: NDArray[np.uint8]) -> bpy.types.Image:
-    """A Blender image with the given sRGB pixels, (H, W, 3) uint8, row 0 at the top."""
+    """A Blender image of sRGB pixels, (H, W, 3) uint8, row 0 at the top."""
     image = bpy.data.images.new(name, pixels.shape[1], pixels.shape[0], alpha=False)
     _set_pixels(image, pixels, 255.0)
     return image
 
 
 def image_from_radiance(name: str, radiance: NDArray[np.float32]) -> bpy.types.Image:
-    """A Blender image of linear RGB, (H, W, 3) of any range, row 0 at the top."""
+    """A Blender image of linear RGB, (H, W, 3) float32 of any range, row 0 at the top."""
     image = bpy.data.images.new(
         name, radiance.shape[1], radiance.shape[0], alpha=False, float_buffer=True, is_data=True
     )
@@ -36,7 +36,7 @@ def _set_pixels(image: bpy.types.Image, values: NDArray[Any], white: float) -> N
 
 
 def build_material(name: str, material: Material) -> bpy.types.Material:
-    """Make a Blender material: a bare diffuse BSDF where that is all there is, as it renders fastest."""
+    """Make a Blender material. It is a diffuse BSDF where that is enough, which renders fastest."""
     block = bpy.data.materials.new(name)
     block.use_nodes = True
     nodes, links = block.node_tree.nodes, block.node_tree.links

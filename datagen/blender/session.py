@@ -1,4 +1,4 @@
-"""Blender's own state: an empty file, Cycles' settings, and its chatter kept off the terminal."""
+"""Blender's global state: the empty file, Cycles' settings, and its output, which goes to a log."""
 
 from __future__ import annotations
 
@@ -11,28 +11,27 @@ from pathlib import Path
 
 import bpy
 
-DEVICES = ("cpu", "cuda", "optix", "hip", "metal")
-
 
 @dataclass(frozen=True)
 class CyclesSettings:
-    """What the beauty render costs and looks like; ground truth does not depend on it."""
+    """The settings of the picture's rendering. Ground truth does not depend on them."""
 
     samples: int = 4
-    """Paths a pixel; the denoiser makes 4 look clean."""
+    """Paths per pixel; the denoiser makes 4 look clean."""
     device: str = "cpu"
-    """One of `DEVICES`."""
+    """`cpu`, `cuda`, `optix`, `hip` or `metal`."""
     threads: int = 1
-    """CPU threads of this process."""
+    """CPU threads that this process may use."""
 
 
 def blender_version() -> str:
+    """The version of Blender's library, such as 4.5.15 LTS."""
     return str(bpy.app.version_string)
 
 
 @contextlib.contextmanager
 def quiet(log: Path) -> Iterator[None]:
-    """Send everything the process prints, Blender's C code included, to the end of a file."""
+    """Append everything that the process prints, from Blender's C code too, to a file."""
     sys.stdout.flush()
     sys.stderr.flush()
     saved = os.dup(1), os.dup(2)
@@ -51,9 +50,10 @@ def quiet(log: Path) -> Iterator[None]:
 
 
 def start_empty_file(settings: CyclesSettings) -> bpy.types.Scene:
-    """Forget everything and return a scene set up for clean-pass rendering with Cycles.
+    """Open an empty file and return its scene, set up to render the clean pass with Cycles.
 
-    Starting from an empty file each time is what keeps the memory of a long-lived worker flat.
+    An empty file for each scene keeps the memory of a long-lived worker flat. Raises RuntimeError if Cycles finds no
+    such device.
     """
     # The preferences are those of the start: reading them again registers every add-on anew, six times as slow.
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -88,12 +88,12 @@ def _configure_cycles(scene: bpy.types.Scene, settings: CyclesSettings) -> None:
     cycles.caustics_reflective = False
     cycles.caustics_refractive = False
     cycles.sample_clamp_indirect = 4.0
-    # Both eyes and all frames see the same world: keep its images and acceleration structures.
+    # Both views and all frames show the same world: keep its images and acceleration structures.
     scene.render.use_persistent_data = True
 
 
 def finds_device(device: str) -> bool:
-    """Whether Cycles can compute on one of `DEVICES` here."""
+    """Whether Cycles can compute on this machine's `cpu`, or finds a `cuda`, `optix`, `hip` or `metal` device."""
     return device == "cpu" or bool(_cycles_preferences().get_devices_for_type(device.upper()))
 
 

@@ -1,1 +1,1 @@
-"""Data sets on disk: where files lie, what a manifest says of them, and how their frames are read."""
+"""Data sets on disk: where the files are, what a scene's manifest says of them, and how frames are read."""

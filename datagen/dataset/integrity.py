@@ -1,4 +1,4 @@
-"""Whether files are what was written down of them: their sizes and SHA-256."""
+"""Comparing files with the sizes and SHA-256 that a manifest or an index has for them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from datagen.dataset.manifest import FileEntry
 
 
 def compare(layout: Layout, entry: FileEntry) -> tuple[int, str | None]:
-    """Read a file of a data set: its bytes, and half a sentence if it is not the one that the entry describes."""
+    """Read a file of a data set and compare it with its entry in the manifest.
+
+    Returns:
+        The number of bytes read, and what is wrong as the end of a sentence ("is damaged, ..."), or None.
+    """
     path = layout.root / entry.path
     try:
         if path.exists() and not path.is_file():  # A pipe or a device would be read without end.
@@ -23,7 +27,7 @@ def compare(layout: Layout, entry: FileEntry) -> tuple[int, str | None]:
 
 
 def compare_open(file: io.BufferedIOBase, entry: FileEntry) -> tuple[int, str | None]:
-    """As `compare`, of a file that is open at its beginning. Raises OSError if it cannot be read."""
+    """`compare` for a file that is open at its beginning. Raises OSError if it cannot be read."""
     digest = hashlib.file_digest(file, "sha256").hexdigest()
     size = file.tell()
     if size != entry.size:

@@ -1,10 +1,10 @@
-"""Where everything of a data set lies: the FlyingThings3D tree, and more beside it.
+"""The paths of a data set: the tree of FlyingThings3D (Mayer et al., CVPR 2016), and more beside it.
 
     recipe.yaml
-    frames_cleanpass/TRAIN/A/0003/left/0006.png     one file an eye and frame
-    camera_data/TRAIN/A/0003/camera_data.txt        one file a scene
+    frames_cleanpass/TRAIN/A/0003/left/0006.png     one file for each view and frame
+    camera_data/TRAIN/A/0003/camera_data.txt        one file for each scene
     scenes/TRAIN/A/0003.json                        the Scene record
-    manifest/TRAIN/A/0003.json                      written last: a scene is there if its manifest is
+    manifest/TRAIN/A/0003.json                      written last: a scene exists if its manifest does
 
 Frames are numbered from `FIRST_FRAME`, as in FlyingThings3D; that file shows the scene at the instant t = 0.
 """
@@ -18,34 +18,40 @@ from pathlib import Path
 from typing import Literal
 
 from datagen.errors import DatasetError
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import LocalTree, Tree
 
 SPLITS = ("train", "val", "test")
-Eye = Literal["left", "right"]
-EYES: tuple[Eye, Eye] = ("left", "right")
+"""Splits never share a scene, a mesh or a texture."""
+SceneKey = tuple[str, int]
+"""A scene of a data set: (split, number)."""
+View = Literal["left", "right"]
+VIEWS: tuple[View, View] = ("left", "right")
+"""The two views of a stereo pair."""
 Direction = Literal["into_future", "into_past"]
 DIRECTIONS: tuple[Direction, Direction] = ("into_future", "into_past")
 """To the instant one frame later, and one frame earlier."""
 
 FIRST_FRAME = 6
+"""Number of the first frame on disk, as in FlyingThings3D."""
 LETTER = "A"
 """FlyingThings3D groups its scenes in A, B and C; all of ours are in the first group."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of data file: the top folder that holds it and how its files are called."""
+    """One kind of data file: the top folder that holds the files, and how they are named."""
 
     folder: str
     extension: str
-    per_eye: bool = True
-    """One file an eye and frame; otherwise one file a scene, named after the kind."""
+    per_view: bool = True
+    """Whether there is a file for each view and frame. Otherwise there is one for each scene, named after the kind."""
     over_time: bool = False
-    """One file a direction, eye and frame."""
+    """Whether there is a file for each direction of time, view and frame."""
 
     @property
     def directions(self) -> tuple[Direction | None, ...]:
-        """What `Layout.file` takes as the direction of this kind."""
+        """The directions that `Layout.file` takes for this kind."""
         return DIRECTIONS if self.over_time else (None,)
 
 
@@ -63,15 +69,16 @@ KINDS = {
         Kind("optical_flow", ".pfm", over_time=True),
         Kind("disparity_change", ".pfm", over_time=True),
         Kind("motion_boundaries", ".pgm", over_time=True),
-        Kind("camera_data", ".txt", per_eye=False),
+        Kind("camera_data", ".txt", per_view=False),
     )
 }
-"""Every kind of data file by its name, which is also its folder's."""
+"""Every kind of data file by its name, which is also the name of its folder."""
 TARGETS = ("disparity", "disparity_gradient", "occlusion", "object_index", "camera_data")
-"""The kinds every scene has, whichever passes were rendered."""
+"""The kinds that every scene has, whichever passes were rendered."""
 EXTRA_TARGETS = ("material_index", "normals", "optical_flow", "disparity_change", "motion_boundaries")
-"""The kinds a recipe may ask for besides."""
+"""The kinds that a recipe may ask for besides."""
 RENDER_PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
+"""The kind of picture file by the name of the render pass."""
 
 _RECORD_NAME = re.compile(r"(\d{4}|[1-9]\d{4,})\.json")
 
@@ -91,63 +98,78 @@ class Layout:
         kind: str,
         split: str,
         scene: int,
-        eye: str | None = None,
+        view: str | None = None,
         frame: int | None = None,
         direction: Direction | None = None,
     ) -> Path:
-        """A data file. Kinds with files an eye need `eye` and the frame's number (`FIRST_FRAME` + t), those
-        over time a direction as well."""
+        """The path of a data file.
+
+        Args:
+            kind: One of `KINDS`.
+            split: "train", "val" or "test".
+            scene: The scene's number, from 0.
+            view: "left" or "right", for kinds with a file for each view.
+            frame: The frame's number on disk, `FIRST_FRAME` + t, for these kinds too.
+            direction: "into_future" or "into_past", for kinds over time.
+
+        Raises:
+            ValueError: If view, frame and direction do not fit the kind.
+            DatasetError: If there is no such split.
+        """
         entry, folder = KINDS[kind], self.scene_folder(kind, split, scene)
-        if not entry.per_eye:
+        if not entry.per_view:
             return folder / f"{entry.folder}{entry.extension}"
-        if eye not in EYES or frame is None or frame < FIRST_FRAME:
-            raise ValueError(
-                f"a file of {kind} needs an eye, left or right, and a frame from {FIRST_FRAME} up, "
-                f"got {eye!r} and {frame}"
+        if view not in VIEWS or frame is None or frame < FIRST_FRAME:
+            raise InputError(
+                f"a file of {kind} needs a view, left or right, and a frame from {FIRST_FRAME} up, "
+                f"got {view!r} and {frame}"
             )
         if direction not in entry.directions:
-            raise ValueError(f"a file of {kind} has no direction {direction!r}")
+            raise InputError(f"a file of {kind} has no direction {direction!r}")
         name = _number(frame)
         if kind == "optical_flow":
             towards = "IntoFuture" if direction == "into_future" else "IntoPast"
-            name = f"OpticalFlow{towards}_{name}_{eye[0].upper()}"
-        return folder / (direction or "") / eye / f"{name}{entry.extension}"
+            name = f"OpticalFlow{towards}_{name}_{view[0].upper()}"
+        return folder / (direction or "") / view / f"{name}{entry.extension}"
 
     def scene_record(self, split: str, scene: int) -> Path:
+        """The path of the Scene record, the world that was rendered."""
         return self._group("scenes", split) / f"{_number(scene)}.json"
 
     def manifest(self, split: str, scene: int) -> Path:
+        """The path of the scene's manifest."""
         return self._group("manifest", split) / f"{_number(scene)}.json"
 
     def scene_paths(self, split: str, scene: int) -> list[Path]:
-        """All that a scene consists of, its folders first and its manifest last."""
+        """All paths that a scene consists of: its folders, then its record, its manifest last."""
         folders = [self.scene_folder(kind, split, scene) for kind in KINDS]
         return [*folders, self.scene_record(split, scene), self.manifest(split, scene)]
 
     @property
     def assets(self) -> Path:
-        """The folder of the user's own files, prepared (`datagen.recipe.assets`)."""
+        """The folder of the prepared user assets (`datagen.recipe.assets`)."""
         return self.root / "assets"
 
     @property
     def recipe(self) -> Path:
+        """The path of the recipe that the data set was rendered from."""
         return self.root / "recipe.yaml"
 
     @property
     def tree(self) -> Tree:
-        """Where the files are."""
+        """The folder or URL that the files are in."""
         return LocalTree(self.root)
 
     def local(self, path: Path) -> Path:
-        """Make sure that a path of this layout can be read, if there is such a file; return it."""
+        """The path of a file on this machine; a remote cache fetches the file first."""
         return path
 
     def committed_scenes(self, split: str) -> list[int]:
-        """The numbers of the scenes that are whole, ascending: those that have a manifest."""
+        """The numbers of the finished scenes, ascending: those that have a manifest."""
         return scene_numbers(self.tree.files_in(self.relative(self._group("manifest", split))))
 
     def relative(self, path: Path) -> str:
-        """A path under the root as the manifest writes it: relative, with forward slashes."""
+        """A path below the root as manifests write it: relative, with forward slashes."""
         return path.relative_to(self.root).as_posix()
 
     def _group(self, folder: str, split: str) -> Path:
@@ -157,12 +179,15 @@ class Layout:
 
 
 def scene_numbers(names: Iterable[str]) -> list[int]:
-    """The scenes whose records or manifests have these file names, ascending; other names are left out."""
+    """The numbers of the scenes whose records or manifests have these file names, ascending.
+
+    Other names are left out.
+    """
     matches = (_RECORD_NAME.fullmatch(name) for name in names)
     return sorted(int(match[1]) for match in matches if match)
 
 
 def _number(value: int) -> str:
     if value < 0:
-        raise ValueError(f"scenes and frames are numbered from 0, got {value}")
+        raise InputError(f"scenes and frames are numbered from 0, got {value}")
     return f"{value:04d}"

@@ -1,4 +1,4 @@
-"""A scene's manifest: every file of it with size and SHA-256. Written last, it makes the scene exist."""
+"""A scene's manifest: all its files with their sizes and SHA-256. It is written last and makes the scene exist."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ T = TypeVar("T")
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 OWN_DIGEST = "manifest_sha256"
+"""The key under which a sealed record has its own SHA-256."""
 _NO_DIGEST = "0" * 64
 _NO_DIGEST_AT_END = re.compile(rf'"{_NO_DIGEST}"\n\}}\n\Z')
 
@@ -47,7 +48,7 @@ class FileEntry:
 
 @dataclass(frozen=True)
 class SceneManifest:
-    """What a committed scene consists of and how it came to be."""
+    """What a committed scene consists of and how it was made."""
 
     family: str
     split: str
@@ -55,15 +56,15 @@ class SceneManifest:
     recipe_sha256: str
     files: tuple[FileEntry, ...]
     seconds: dict[str, float] = field(default_factory=dict)
-    """Wall time of each step."""
+    """Wall time of each step in seconds."""
     statistics: dict[str, Any] = field(default_factory=dict)
     """Numbers about the scene's frames."""
     versions: dict[str, str] = field(default_factory=dict)
-    """Of the software that made it."""
+    """Versions of the software that made the scene, by its name."""
 
 
 def file_entry(root: Path, path: Path) -> FileEntry:
-    """Measure the file at `path`, which lies under `root`."""
+    """The entry of the file at `path`, which lies below `root`. Raises OSError if it cannot be read."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         size = file.tell()
@@ -71,19 +72,19 @@ def file_entry(root: Path, path: Path) -> FileEntry:
 
 
 def write_manifest(path: Path, manifest: SceneManifest) -> None:
-    """Commit a scene: all its files must be in place before."""
+    """Write a scene's manifest, which commits the scene: all its files must be in place."""
     write_text(path, seal(asdict(manifest)))
 
 
 def seal(record: dict[str, Any]) -> str:
-    """A record as JSON with the text's own SHA-256 at its end, taken with zeros in that place."""
+    """A record as JSON text that ends with the text's own SHA-256, computed with zeros in its place."""
     text = json.dumps(record | {OWN_DIGEST: _NO_DIGEST}, indent=1) + "\n"
     digest = hashlib.sha256(text.encode()).hexdigest()
     return _NO_DIGEST_AT_END.sub(f'"{digest}"\n}}\n', text)
 
 
 def read_manifest(path: Path) -> SceneManifest:
-    """Read a manifest. Raises DatasetError with one sentence for a file that is not one."""
+    """Read a scene's manifest. Raises DatasetError for a file that is missing, damaged or no manifest."""
     try:
         content = read_bounded(path, MAX_JSON_BYTES)
         data = json.loads(content)
@@ -103,7 +104,10 @@ def read_manifest(path: Path) -> SceneManifest:
 
 
 def check_seal(content: bytes, digest: Any) -> None:
-    """Raise DatasetError, without the file's name, unless content sealed by `seal` is what it was."""
+    """Raise DatasetError, without the file's name, if text that `seal` made has changed.
+
+    digest: The SHA-256 that the text carries.
+    """
     if not isinstance(digest, str) or not _SHA256.fullmatch(digest):
         raise DatasetError(f"does not carry its own SHA-256 but {str(digest)[:80]!r}")
     plain = content.replace(digest.encode(), _NO_DIGEST.encode())
@@ -112,7 +116,7 @@ def check_seal(content: bytes, digest: Any) -> None:
 
 
 def file_entries(value: Any) -> tuple[FileEntry, ...]:
-    """Entries from JSON. Raises TypeError, ValueError or DatasetError for anything else."""
+    """File entries from their parsed JSON. Raises TypeError, ValueError or DatasetError for anything else."""
     if not isinstance(value, list):
         raise TypeError("its files are not a list")
     return tuple(_typed(FileEntry, _FILE_TYPES, entry) for entry in value)

@@ -1,4 +1,4 @@
-"""A data set behind a URL, read through copies in a folder of this machine."""
+"""A remote cache: a data set behind a URL, read through copies in a folder of this machine."""
 
 from __future__ import annotations
 
@@ -14,18 +14,23 @@ from stereoforge_kit.files import LocalTree, Tree, write_bytes
 
 
 @dataclass(frozen=True)
-class MirroredLayout(Layout):
-    """Paths in the folder of copies; `local` fetches what is not there yet."""
+class RemoteLayout(Layout):
+    """The layout of a data set behind a URL. Its paths are in the cache; `local` fetches what is not there yet."""
 
     source: Tree
-    """Where the data set is."""
+    """The URL of the data set."""
 
     @property
     def tree(self) -> Tree:
+        """The URL of the data set."""
         return self.source
 
     def local(self, path: Path) -> Path:
-        """Copy a file to its path, unless it is there. Raises DatasetError if the other side does not answer."""
+        """Fetch a file into the cache unless it is there, and return its path.
+
+        A manifest is fetched each time: a scene may have been rendered again. A file that does not exist stays
+        missing. Raises DatasetError if the server does not answer.
+        """
         name = self.relative(path)
         is_manifest = name.startswith("manifest/")
         if path.exists() and not is_manifest:
@@ -42,27 +47,27 @@ class MirroredLayout(Layout):
         return path
 
     def _renew_scene(self, manifest: Path, name: str) -> None:
-        """Fetch a scene's manifest again, and forget the scene's copies if it is another one now."""
+        """Fetch a scene's manifest again, and remove the scene's copies if it has changed."""
         data = self.source.read(name)
         if manifest.exists() and manifest.read_bytes() != data:
             self.forget(manifest.parent.parent.name.lower(), int(manifest.stem))
         write_bytes(manifest, data)
 
     def forget(self, split: str, scene: int) -> None:
-        """Remove the copies of a scene."""
+        """Remove a scene's copies from the cache."""
         copies = LocalTree(self.root)
         for path in self.scene_paths(split, scene):
             copies.remove(self.relative(path))
 
 
-def open_mirror(tree: Tree, folder: Path | None = None) -> MirroredLayout:
-    """The layout of a data set behind a URL, with copies in `folder` or the user's cache.
+def open_remote(tree: Tree, folder: Path | None = None) -> RemoteLayout:
+    """The layout of a data set behind a URL, cached in `folder`, by default in the user's cache folder.
 
-    Raises DatasetError where there is no data set.
+    Raises DatasetError if there is no data set.
     """
-    layout = MirroredLayout(folder or _cache_folder(tree), tree)
+    layout = RemoteLayout(folder or _cache_folder(tree), tree)
     with suppress(FileNotFoundError):
-        layout.recipe.unlink()  # It may have grown.
+        layout.recipe.unlink()  # The data set may have grown.
     layout.local(layout.recipe)
     if not layout.recipe.is_file():
         raise DatasetError(f"{tree.name}: is not a data set, it has no {layout.recipe.name}")

@@ -1,4 +1,4 @@
-"""Reading a data set: a sequence of stereo samples whose arrays are read when they are asked for."""
+"""Reading a data set: a sequence of stereo samples whose arrays are read at first use."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.dataset.integrity import compare
-from datagen.dataset.layout import EYES, RENDER_PASSES, SPLITS, Direction, Eye, Layout
+from datagen.dataset.layout import RENDER_PASSES, SPLITS, VIEWS, Direction, Layout, View
 from datagen.dataset.manifest import FileEntry, read_manifest
-from datagen.dataset.remote_cache import open_mirror
+from datagen.dataset.remote_cache import open_remote
 from datagen.errors import DatasetError
 from datagen.formats import (
     read_flow,
@@ -29,12 +29,13 @@ from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.png import read_png_size
 from scenes import Scene, scene_from_json
 from scenes.user_assets.pool import use_store
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import LocalTree, open_tree
 
 
 @dataclass(frozen=True)
-class EyeView:
-    """What one eye of a sample sees; shapes and meanings are those of `StereoSample`."""
+class SampleView:
+    """The arrays of one view of a sample; shapes and meanings are those of `StereoSample`."""
 
     image: NDArray[np.uint8]
     disparity: NDArray[np.float32]
@@ -46,10 +47,11 @@ class EyeView:
 
 @dataclass(frozen=True)
 class StereoSample:
-    """One frame of a scene. Every array is read at its first use and kept as long as the sample is.
+    """One frame of a scene: both views with their ground truth.
 
-    Reading raises DatasetError, naming the file, for one that is missing, not the one that the scene's manifest
-    describes by its SHA-256, or not of the size of the left image.
+    An array is read at its first use and kept as long as the sample. Reading raises DatasetError, naming the file,
+    for a file that is missing, differs from its SHA-256 in the scene's manifest, or does not have the size of the
+    left image.
     """
 
     layout: Layout
@@ -58,6 +60,7 @@ class StereoSample:
     frame: int
     """The frame's number on disk."""
     render_pass: str = "clean"
+    """Which images are read, "clean" or "final"."""
 
     @property
     def name(self) -> str:
@@ -108,22 +111,22 @@ class StereoSample:
 
     @property
     def gradient_valid_left(self) -> NDArray[np.bool_]:
-        """(H, W) where the gradient exists and is no discontinuity."""
+        """(H, W) True where the gradient exists and is no discontinuity."""
         return self._gradient_left[1]
 
     @property
     def gradient_valid_right(self) -> NDArray[np.bool_]:
-        """(H, W) where the gradient exists and is no discontinuity."""
+        """(H, W) True where the gradient exists and is no discontinuity."""
         return self._gradient_right[1]
 
     @cached_property
     def occlusion_left(self) -> NDArray[np.uint8]:
-        """(H, W) 0 visible in the right image, 1 occluded, 2 out of its frame."""
+        """(H, W) 0 visible in the right view, 1 occluded there, 2 out of its frame."""
         return self._occlusion("left")
 
     @cached_property
     def occlusion_right(self) -> NDArray[np.uint8]:
-        """(H, W) 0 visible in the left image, 1 occluded, 2 out of its frame."""
+        """(H, W) 0 visible in the left view, 1 occluded there, 2 out of its frame."""
         return self._occlusion("right")
 
     @cached_property
@@ -138,42 +141,45 @@ class StereoSample:
 
     @property
     def foreground_left(self) -> NDArray[np.uint16] | None:
-        """None: the object index numbers everything, and none of it is called the foreground."""
+        """None: the object index numbers all objects, and none of them is the foreground."""
         return None
 
-    def view(self, eye: Eye) -> EyeView:
-        """Everything of the "left" or "right" eye."""
-        if eye not in EYES:
-            raise ValueError(f"an eye is 'left' or 'right', not {eye!r}")
-        return EyeView(
-            image=getattr(self, eye),
-            disparity=getattr(self, f"disparity_{eye}"),
-            gradient=getattr(self, f"gradient_{eye}"),
-            gradient_valid=getattr(self, f"gradient_valid_{eye}"),
-            occlusion=getattr(self, f"occlusion_{eye}"),
-            object_index=getattr(self, f"object_index_{eye}"),
+    def view(self, view: View) -> SampleView:
+        """All arrays of the "left" or "right" view. Raises ValueError for another name."""
+        if view not in VIEWS:
+            raise InputError(f"a view is 'left' or 'right', not {view!r}")
+        return SampleView(
+            image=getattr(self, view),
+            disparity=getattr(self, f"disparity_{view}"),
+            gradient=getattr(self, f"gradient_{view}"),
+            gradient_valid=getattr(self, f"gradient_valid_{view}"),
+            occlusion=getattr(self, f"occlusion_{view}"),
+            object_index=getattr(self, f"object_index_{view}"),
         )
 
-    def material_index(self, eye: Eye) -> NDArray[np.uint16]:
-        """(H, W) 0 sky, else 1 + index in the scene's materials. Needs the target, as the methods below do;
-        what they return is read anew at each call."""
-        return self._extra("material_index", eye, read_png, (), np.uint16)
+    def material_index(self, view: View) -> NDArray[np.uint16]:
+        """(H, W) 0 sky, else 1 + index in the scene's materials.
 
-    def normals(self, eye: Eye) -> NDArray[np.float32]:
-        """(H, W, 3) unit vectors in the camera's frame (x right, y up, z back), 0 for the sky."""
-        return self._extra("normals", eye, read_normals, (3,), np.float32)
+        This method and those below read their file at each call. They raise DatasetError for a data set that was
+        rendered without the target.
+        """
+        return self._extra("material_index", view, read_png, (), np.uint16)
 
-    def flow(self, eye: Eye, direction: Direction) -> NDArray[np.float32]:
-        """(H, W, 2) px [right, down] to where the pixel's point is one frame on; NaN invalid."""
-        return self._extra("optical_flow", eye, read_flow, (2,), np.float32, direction)
+    def normals(self, view: View) -> NDArray[np.float32]:
+        """(H, W, 3) unit normals in the camera's frame (x right, y up, z towards the camera), 0 for the sky."""
+        return self._extra("normals", view, read_normals, (3,), np.float32)
 
-    def disparity_change(self, eye: Eye, direction: Direction) -> NDArray[np.float32]:
-        """(H, W) px the disparity of the pixel's point grows by until one frame on; NaN invalid."""
-        return self._extra("disparity_change", eye, read_pfm, (), np.float32, direction)
+    def flow(self, view: View, direction: Direction) -> NDArray[np.float32]:
+        """(H, W, 2) optical flow in px [to the right, down] to the next or the previous frame; NaN invalid."""
+        return self._extra("optical_flow", view, read_flow, (2,), np.float32, direction)
 
-    def motion_boundaries(self, eye: Eye, direction: Direction) -> NDArray[np.bool_]:
-        """(H, W) where objects that move differently meet."""
-        return self._extra("motion_boundaries", eye, read_mask, (), np.bool_, direction)
+    def disparity_change(self, view: View, direction: Direction) -> NDArray[np.float32]:
+        """(H, W) px by which the disparity of a pixel's point grows until that frame; NaN invalid."""
+        return self._extra("disparity_change", view, read_pfm, (), np.float32, direction)
+
+    def motion_boundaries(self, view: View, direction: Direction) -> NDArray[np.bool_]:
+        """(H, W) True where objects that move differently meet."""
+        return self._extra("motion_boundaries", view, read_mask, (), np.bool_, direction)
 
     @cached_property
     def scene_record(self) -> Scene:
@@ -181,7 +187,10 @@ class StereoSample:
         return read_scene(self.intact(self.layout.scene_record(self.split, self.scene)))
 
     def intact(self, path: Path) -> Path:
-        """A path of one of the scene's files, compared with its manifest. Raises DatasetError."""
+        """Compare one of the scene's files with the manifest and return its path.
+
+        Raises DatasetError for a file that is missing, damaged or not in the manifest.
+        """
         entry = self._entries.get(self.layout.relative(path))
         if entry is None:
             raise DatasetError(f"{path}: is not in the scene's manifest")
@@ -207,35 +216,35 @@ class StereoSample:
     def _image_kind(self) -> str:
         return RENDER_PASSES[self.render_pass]
 
-    def _file(self, kind: str, eye: Eye, direction: Direction | None = None) -> Path:
-        return self.intact(self.layout.file(kind, self.split, self.scene, eye, self.frame, direction))
+    def _file(self, kind: str, view: View, direction: Direction | None = None) -> Path:
+        return self.intact(self.layout.file(kind, self.split, self.scene, view, self.frame, direction))
 
-    def _image(self, eye: Eye) -> NDArray[np.uint8]:
-        path = self._file(self._image_kind, eye)
+    def _image(self, view: View) -> NDArray[np.uint8]:
+        path = self._file(self._image_kind, view)
         image = read_png(path)
         self._check(path, image, (*self.size, 3), np.uint8)
         return image  # type: ignore[return-value]
 
-    def _disparity(self, eye: Eye) -> NDArray[np.float32]:
-        path = self._file("disparity", eye)
+    def _disparity(self, view: View) -> NDArray[np.float32]:
+        path = self._file("disparity", view)
         disparity = read_pfm(path)
         self._check(path, disparity, self.size, np.float32)
         return disparity
 
-    def _gradient(self, eye: Eye) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        path = self._file("disparity_gradient", eye)
+    def _gradient(self, view: View) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        path = self._file("disparity_gradient", view)
         gradient, valid = read_gradient(path)
         self._check(path, gradient, (*self.size, 2), np.float32)
         return gradient, valid
 
-    def _occlusion(self, eye: Eye) -> NDArray[np.uint8]:
-        path = self._file("occlusion", eye)
+    def _occlusion(self, view: View) -> NDArray[np.uint8]:
+        path = self._file("occlusion", view)
         labels = read_occlusion(path)
         self._check(path, labels, self.size, np.uint8)
         return labels
 
-    def _object_index(self, eye: Eye) -> NDArray[np.uint16]:
-        path = self._file("object_index", eye)
+    def _object_index(self, view: View) -> NDArray[np.uint16]:
+        path = self._file("object_index", view)
         index = read_png(path)
         self._check(path, index, self.size, np.uint16)
         return index  # type: ignore[return-value]
@@ -243,13 +252,13 @@ class StereoSample:
     def _extra(
         self,
         kind: str,
-        eye: Eye,
+        view: View,
         read: Callable[[Path], NDArray[Any]],
         channels: tuple[int, ...],
         dtype: type,
         direction: Direction | None = None,
     ) -> NDArray[Any]:
-        path = self._file(kind, eye, direction)
+        path = self._file(kind, view, direction)
         values = read(path)
         self._check(path, values, (*self.size, *channels), dtype)
         return values
@@ -263,7 +272,7 @@ class StereoSample:
 
 
 class StereoDataset(Sequence[StereoSample]):
-    """The frames of all finished scenes of one split, in order; a scene without its manifest is not there."""
+    """The frames of all finished scenes of one split, in order, as `StereoSample`s."""
 
     def __init__(self, root: Path | str, split: str, render_pass: str = "clean") -> None:
         """Find the frames; no array is read yet.
@@ -326,11 +335,11 @@ class StereoDataset(Sequence[StereoSample]):
 def open_layout(root: Path | str) -> Layout:
     """The layout of an existing data set, in a folder or behind a URL.
 
-    Raises DatasetError for a folder that is missing or is none.
+    Raises DatasetError for a folder that is missing or no data set.
     """
     tree = open_tree(root)
     if not isinstance(tree, LocalTree):
-        return open_mirror(tree)
+        return open_remote(tree)
     layout = Layout(tree.root)
     if not layout.root.is_dir():
         raise DatasetError(f"{layout.root}: there is no such folder")
@@ -340,7 +349,7 @@ def open_layout(root: Path | str) -> Layout:
 
 
 def read_scene(path: Path) -> Scene:
-    """Read a Scene record of a data set. Raises DatasetError for one that is missing or describes no scene."""
+    """Read a Scene record of a data set. Raises DatasetError for a file that is missing or no such record."""
     use_store(Layout(path.parents[3]).assets)
     try:
         return scene_from_json(read_bounded(path, MAX_JSON_BYTES).decode("utf-8"))

@@ -1,7 +1,7 @@
-"""Tar shards of samples (the WebDataset convention), read at random: an index of the members, then a seek and a read.
+"""Random access to tar shards of samples (the WebDataset convention, github.com/webdataset/webdataset).
 
-Shards may lie on any file system fsspec knows. A remote one is copied whole to a cache folder the first time one of
-its samples is asked for, and read from there ever after.
+A shard's headers give an index of its members; a member is then read by a seek. Shards may be on any file system that
+fsspec knows. A remote shard is copied whole to a cache folder when one of its samples is first read.
 """
 
 from __future__ import annotations
@@ -22,23 +22,28 @@ from datagen.formats.limits import MAX_FILE_BYTES
 from stereoforge_kit.files import replacing
 
 CACHE_VARIABLE = "STEREOFORGE_CACHE"
+"""The environment variable that names the cache folder."""
 _INDICES_KEPT = 4096
 _MAX_HEADER_BYTES = 1 << 20
 
 
 class Extent(NamedTuple):
-    """Where a member's bytes lie in its shard."""
+    """Where a member's bytes are in its shard, in bytes."""
 
     offset: int
     size: int
 
 
 ShardIndex = dict[str, dict[str, Extent]]
-"""Sample key to member (what follows the key and a dot: `left.png`) to extent, in the shard's order."""
+"""For each sample key, in the shard's order, the extents of its members. A member's name is what follows the key and
+a dot, such as `left.png`."""
 
 
 def list_shards(location: str) -> list[str]:
-    """The URLs of the tar files of a folder, or the one tar file named, sorted. Raises DatasetError."""
+    """The sorted URLs of a folder's tar files, or the URL of the one tar file named.
+
+    Raises DatasetError if the location cannot be listed.
+    """
     try:
         system, path = fsspec.core.url_to_fs(location)
         found = [path] if path.endswith(".tar") else sorted(system.glob(f"{path.rstrip('/')}/*.tar"))
@@ -48,7 +53,10 @@ def list_shards(location: str) -> list[str]:
 
 
 def read_sample_member(shard: str, key: str, member: str) -> bytes | None:
-    """The bytes of one member of a sample, None where the sample has no such member. Raises DatasetError."""
+    """The bytes of one member of a sample, None if the sample has no such member.
+
+    Raises KeyError if the shard has no such sample, and DatasetError if it cannot be read.
+    """
     path = local_copy(shard)
     extent = shard_index(path)[key].get(member)
     if extent is None:
@@ -62,7 +70,7 @@ def read_sample_member(shard: str, key: str, member: str) -> bytes | None:
 
 
 class _HeaderFile(io.FileIO):
-    """A file in which tarfile finds headers: it would ask for, and allocate, whatever one of them declares."""
+    """A file for tarfile's headers with a limit: tarfile reads, and allocates, whatever size a header declares."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is None or not 0 <= size <= _MAX_HEADER_BYTES:
@@ -72,7 +80,7 @@ class _HeaderFile(io.FileIO):
 
 @lru_cache(maxsize=_INDICES_KEPT)
 def shard_index(path: Path) -> ShardIndex:
-    """What a shard holds, from its headers alone. Raises FormatError for a damaged shard."""
+    """The index of a local shard, from its headers alone. Raises FormatError for a damaged shard."""
     index: ShardIndex = {}
     try:
         with _HeaderFile(path) as file, tarfile.open(fileobj=file, mode="r:") as shard:
@@ -94,7 +102,10 @@ def shard_index(path: Path) -> ShardIndex:
 
 @lru_cache(maxsize=_INDICES_KEPT)
 def local_copy(shard: str) -> Path:
-    """The shard itself if it is a local file, else its copy in the cache, made if need be. Raises DatasetError."""
+    """The path of a shard on this machine: its own if it is local, else that of a copy in the cache.
+
+    Raises DatasetError if the shard cannot be fetched.
+    """
     try:
         system, path = fsspec.core.url_to_fs(shard)
         if "file" in _protocols(system):
@@ -111,7 +122,7 @@ def local_copy(shard: str) -> Path:
 
 
 def cache_folder() -> Path:
-    """Where copies of remote shards are kept: $STEREOFORGE_CACHE, or `stereoforge` in the user's cache folder."""
+    """The folder for copies of remote files: $STEREOFORGE_CACHE, or `stereoforge` in the user's cache folder."""
     given = os.environ.get(CACHE_VARIABLE)
     if given:
         return Path(given)

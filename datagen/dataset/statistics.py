@@ -1,4 +1,4 @@
-"""Statistics of a data set's frames: what a network would be trained on, in numbers and histograms."""
+"""Statistics of a data set's frames: disparity, occlusion, objects and texture."""
 
 from __future__ import annotations
 
@@ -10,37 +10,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.dataset.samples import StereoSample
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME
 
 TEXTURE_WINDOW_PX = 9
-"""Side of the window a pixel's texture is judged in, about what block matching compares."""
+"""Width of the window in which a pixel's texture is judged, about what block matching compares."""
 TEXTURE_DEVIATION = 3.0
-"""Standard deviation of grey, in levels of 255, above which a window counts as textured."""
+"""Standard deviation of grey, on a scale of 0 to 255, above which a window counts as textured."""
 PIXEL_STEP = 4
-"""Every so many pixels of each axis go into the distribution of the disparity."""
+"""Every fourth pixel along each axis goes into the distribution of the disparity."""
 
 
 @dataclass(frozen=True)
 class SetStatistics:
-    """Distributions over the left views of some frames."""
+    """Distributions over the left views of F frames."""
 
     disparity: NDArray[np.float32]
-    """(P,) px, a regular subset of all frames' pixels."""
+    """(P,) px, of a regular subset of all frames' pixels."""
     occluded: NDArray[np.float64]
-    """(F,) share of each frame's pixels that another surface hides from the right eye."""
+    """(F,) share of each frame's pixels that are occluded in the right view."""
     out_of_frame: NDArray[np.float64]
-    """(F,) share of each frame's pixels that lie outside the right image."""
+    """(F,) share of each frame's pixels that lie out of the right view's frame."""
     visible_objects: NDArray[np.int64]
     """(F,) number of objects with at least one pixel."""
     textured: NDArray[np.float64]
-    """(F,) share of each frame's pixels with texture around them."""
+    """(F,) share of each frame's pixels whose window is textured."""
 
     def __len__(self) -> int:
         return len(self.occluded)
 
 
 def measure(samples: Iterable[StereoSample]) -> SetStatistics:
-    """Read and measure the left views of at least one sample. Raises DatasetError for damaged files."""
+    """Measure the left views of at least one sample. Raises DatasetError for damaged files."""
     rows = [
         (
             sample.disparity_left[::PIXEL_STEP, ::PIXEL_STEP].ravel(),
@@ -62,7 +62,7 @@ def measure(samples: Iterable[StereoSample]) -> SetStatistics:
 
 
 def textured_share(image: NDArray[np.uint8]) -> float:
-    """Share of pixels of an (H, W, 3) sRGB image whose window's grey values deviate enough to be matched."""
+    """Share of the pixels of an (H, W, 3) sRGB image whose window has enough contrast to be matched."""
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY).astype(np.float64)
     window = (TEXTURE_WINDOW_PX, TEXTURE_WINDOW_PX)
     variance = cv2.blur(grey * grey, window) - cv2.blur(grey, window) ** 2

@@ -1,4 +1,4 @@
-"""Ways to spread independent jobs: each takes a function and jobs, and yields an outcome for each."""
+"""Ways to run independent jobs in parallel: an executor takes a function and jobs and yields an outcome for each."""
 
 from datagen.executors.base import Executor, Failure, Outcome, Outcomes
 from datagen.executors.local import LocalExecutor

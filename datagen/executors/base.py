@@ -1,4 +1,4 @@
-"""What an executor is."""
+"""The interface of executors, and the outcomes that they yield."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ FailureKind = Literal["crash", "killed", "timeout", "memory", "exception", "disk
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a job gave no result."""
+    """Why a job has no result."""
 
     kind: FailureKind
     sentence: str
+    """What happened, in one sentence."""
     output: str = ""
-    """The end of what the last attempt printed."""
+    """The end of the last attempt's output."""
 
 
 @dataclass(frozen=True)
 class Outcome(Generic[Job, Result]):
-    """How one job ended: with a result, or with what went wrong."""
+    """How one job ended: with a result or a failure."""
 
     job: Job
     result: Result | None
@@ -33,17 +34,20 @@ class Outcome(Generic[Job, Result]):
 
 
 Outcomes: TypeAlias = Generator[Outcome[Job, Result], None, None]
-"""Outcomes as they come; to be closed when no more of them are wanted."""
+"""Outcomes as they come. Close the generator when no more of them are wanted."""
 
 
 class Executor(Protocol):
-    """Runs jobs somewhere. Closing the iterator early stops the work and leaves no process behind."""
+    """Runs jobs in parallel."""
 
     @property
     def threads(self) -> int:
-        """How many CPU threads a job may use."""
+        """Number of CPU threads that a job may use."""
         ...
 
     def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Outcomes[Job, Result]:
-        """Call a picklable function on every job, yielding outcomes as they come, in any order."""
+        """Call a picklable function on every job and yield the outcomes as they come, in any order.
+
+        Closing the generator early stops the work and leaves no process behind.
+        """
         ...

@@ -1,4 +1,4 @@
-"""Which graphics processor each worker may see: one worker a GPU, and each GPU its own."""
+"""Which GPU each worker may see: by default one worker for each GPU."""
 
 from __future__ import annotations
 
@@ -6,34 +6,36 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-VISIBLE = {
+VISIBLE_DEVICES = {
     "cuda": "CUDA_VISIBLE_DEVICES",
     "optix": "CUDA_VISIBLE_DEVICES",
     "hip": "HIP_VISIBLE_DEVICES",
 }
-"""The variable that tells a process which GPUs there are, by Cycles' name for the device."""
+"""The environment variable that limits the GPUs a process sees, by Cycles' name for the device."""
 _KFD_NODES = Path("/sys/class/kfd/kfd/topology/nodes")
 
 
 def assign_devices(
     device: str, gpus: Sequence[str], workers: int | None = None
 ) -> tuple[Mapping[str, str], ...]:
-    """Environment variables of each worker, one worker a GPU unless told how many; they take turns then.
+    """The environment variables of each worker.
 
-    gpus: the names of the GPUs as the variable in `VISIBLE` takes them, such as "0" or a UUID. Devices that
-    cannot be told apart by a variable (the CPU, Apple's) and machines that name none give empty mappings.
+    Args:
+        device: What Cycles computes on. Devices that no variable tells apart (the CPU, Apple's) give empty mappings.
+        gpus: The names of the GPUs as the variable in `VISIBLE_DEVICES` takes them, such as "0" or a UUID.
+        workers: How many workers, which are spread over the GPUs evenly; None for one per GPU.
     """
-    if device not in VISIBLE or not gpus:
+    if device not in VISIBLE_DEVICES or not gpus:
         return ({},) * (workers or 1)
     count = len(gpus) if workers is None else workers
-    return tuple({VISIBLE[device]: gpus[index % len(gpus)]} for index in range(count))
+    return tuple({VISIBLE_DEVICES[device]: gpus[index % len(gpus)]} for index in range(count))
 
 
 def find_gpus(device: str, environment: Mapping[str, str]) -> list[str]:
-    """The GPUs this process may use: those its own variable names, or all that the driver lists."""
-    if device not in VISIBLE:
+    """The GPUs that this process may use: those that its environment names, or all that the driver lists."""
+    if device not in VISIBLE_DEVICES:
         return []
-    named = environment.get(VISIBLE[device])
+    named = environment.get(VISIBLE_DEVICES[device])
     if named is not None:
         return [name.strip() for name in named.split(",") if name.strip()]
     count = _count_amd() if device == "hip" else _count_nvidia()

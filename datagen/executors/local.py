@@ -14,17 +14,19 @@ from stereoforge_kit.processes.process import POLL_S
 
 @dataclass(frozen=True)
 class LocalExecutor:
-    """Spawned processes, each taking one job at a time."""
+    """Spawned worker processes, each with one job at a time."""
 
     environments: tuple[Mapping[str, str], ...]
-    """One worker each, with these environment variables, such as the GPU it may see."""
+    """The environment variables of each worker, such as the GPU that it may see."""
     policy: WorkerPolicy = field(default_factory=WorkerPolicy)
 
     @property
     def threads(self) -> int:
+        """Number of CPU threads that a job may use: an equal share of this process's cores."""
         return max(1, len(os.sched_getaffinity(0)) // len(self.environments))
 
     def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Outcomes[Job, Result]:
+        """Call a picklable function on every job and yield the outcomes as they come, in any order."""
         queue = iter(jobs)
         supervisors = [Supervisor(self.policy, environment) for environment in self.environments]
         try:

@@ -1,7 +1,7 @@
 """Workers on the machines of a Ray cluster.
 
-Ray decides where a job runs, and runs it again where a machine is lost. On the machine itself each Ray worker
-keeps one supervised process, so time limit, memory limit, retries and logs are those of the local executor.
+Ray decides where a job runs, and runs it again if a machine is lost. On the machine each Ray worker keeps one
+supervised process, so time limit, memory limit, retries and logs are those of the local executor.
 """
 
 from __future__ import annotations
@@ -22,29 +22,30 @@ from stereoforge_kit.files import temporary_folder
 from stereoforge_kit.processes.process import POLL_S
 
 LOST_MACHINE_RETRIES = 10
-"""How often Ray may run a job again whose machine or Ray worker is gone."""
+"""How often Ray may run a job again after its machine or Ray worker was lost."""
 QUEUED_PER_SLOT = 2
-"""Jobs given to Ray for each it can run at once: enough to keep it busy, few enough to be held anywhere."""
+"""Jobs given to Ray for each that it can run at once: enough to keep it busy, few enough to be kept in memory."""
 LONGEST_PLACE = 10
-"""Characters of the folder for temporary files in which Ray's sockets, 97 characters further down, can be made."""
+"""Longest path of a folder for temporary files in which Ray can make its sockets, whose names add 97 characters."""
 CANCEL_ROUNDS, CANCEL_ROUND_S = 12, 5.0
-"""How often running jobs are asked to end, and how long each time may take, before they are left to Ray."""
+"""How often running jobs are asked to end, and how many seconds each time may take, before they are left to Ray."""
 
 
 @dataclass(frozen=True)
 class RayExecutor:
-    """Jobs as Ray tasks; an existing cluster, or one on this machine for the time of the run."""
+    """Runs jobs as Ray tasks, on an existing cluster or on one of this machine for the time of the run."""
 
     address: str | None = None
-    """Of a cluster, such as `auto` or `ray://host:10001`; None for a cluster of this machine alone."""
+    """Address of a cluster, such as `auto` or `ray://host:10001`; None for a cluster of this machine alone."""
     workers: int | None = None
-    """Most jobs at once; None for all that the cluster's resources allow."""
+    """Most jobs at once; None for as many as the cluster's resources allow."""
     cpus_per_job: int = 1
     gpus_per_job: float = 0.0
     policy: WorkerPolicy = field(default_factory=WorkerPolicy)
 
     @property
     def threads(self) -> int:
+        """Number of CPU threads that a job may use."""
         return self.cpus_per_job
 
     @property
@@ -55,6 +56,7 @@ class RayExecutor:
         return self.address is None and not ray.is_initialized()
 
     def run(self, function: Callable[[Job], Result], jobs: Iterable[Job]) -> Outcomes[Job, Result]:
+        """Call a picklable function on every job and yield the outcomes as they come, in any order."""
         import ray
 
         queue = iter(jobs)
@@ -78,7 +80,7 @@ class RayExecutor:
                     yield _outcome(running.pop(reference), reference)
 
     def _slots(self) -> int:
-        """How many jobs the cluster as it is now can run at once."""
+        """How many jobs the cluster can run at once as it is now."""
         import ray
 
         resources = ray.cluster_resources()
@@ -106,7 +108,7 @@ def _cancel(references: list[Any]) -> None:
 
 @contextmanager
 def _connected(executor: RayExecutor, running: Collection[Any]) -> Iterator[None]:
-    """Use the connection of this process if it has one, else make one; what is running at the end is ended.
+    """Use this process's connection to Ray if it has one, else make one; end what is running at the end.
 
     With our own connection everything ends that came by it. To cancel would be a risk: a task that is done just
     then makes Ray abort this process (Ray's issue of `submissible_tasks_`, met with Ray 2.60).
@@ -161,7 +163,7 @@ _supervisor: Supervisor | None = None
 def _run_supervised(
     function: Callable[[Any], Any], job: Any, policy: WorkerPolicy
 ) -> tuple[Any, Failure | None, int]:
-    """A Ray worker's side: run a job in this worker's supervised process and wait for its outcome."""
+    """In a Ray worker: run a job in the worker's supervised process and wait for its outcome."""
     global _supervisor
     if _supervisor is None or _supervisor.policy != policy:
         _supervisor = Supervisor(policy)

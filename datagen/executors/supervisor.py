@@ -1,4 +1,4 @@
-"""One worker slot: a job goes in, an outcome comes out, whatever happens to the processes meanwhile."""
+"""One worker slot: it takes a job and gives an outcome, whatever happens to the process meanwhile."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from datagen.executors.base import Failure, Outcome
 from stereoforge_kit.processes import Limits, WorkerError, WorkerProcess
 
 MAX_KILLS = 30
-"""How often a job may be killed from outside. It is not the job's fault, but a machine without memory does that too."""
+"""How often a job may be killed from outside. It may not be the job's fault: a machine out of memory kills too."""
 MAX_STARTS_KILLED = 100
-"""How often in a row processes may be killed before they have begun the job, which the job has no part in.
+"""How often in a row processes may be killed before they begin the job.
 
-Counted apart, since coming up takes longer than a small job: where workers were killed every four seconds on a busy
-machine, 18 of 300 jobs were given up before any process had come to them.
+This is counted apart, since a process may take longer to start than a small job to run: with workers killed every four
+seconds on a busy machine, 18 of 300 jobs were given up before any process had begun them.
 """
 SAME_SUMS = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-"""Matrix products on several threads add up in another order: a scene's last bits would tell how many cores it had."""
+"""Matrix products on several threads add up in another order, and a scene's last bits would depend on the cores."""
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -30,9 +30,9 @@ class WorkerPolicy:
 
     limits: Limits = field(default_factory=Limits)
     attempts: int = 2
-    """How often a job is tried that crashes its process or breaks its limits; an exception is final."""
+    """How often a job that crashes its process or exceeds its limits is tried. An exception is final."""
     jobs_per_worker: int = 40
-    """A process is replaced after so many jobs: Blender's memory grows slowly."""
+    """A process is replaced after so many jobs, since Blender's memory grows slowly."""
     recycle_bytes: int = 2 << 30
     """A process that holds more memory than this after a job is replaced."""
 
@@ -40,7 +40,7 @@ class WorkerPolicy:
 class Supervisor:
     """Runs one job at a time in a worker process that it starts, recycles and replaces as needed.
 
-    Ask `poll` until it gives the job's outcome, waiting on `waitables` meanwhile.
+    Call `poll` until it returns the job's outcome, and wait on `waitables` in between.
     """
 
     def __init__(self, policy: WorkerPolicy, environment: Mapping[str, str] | None = None) -> None:
@@ -54,20 +54,23 @@ class Supervisor:
 
     @property
     def busy(self) -> bool:
+        """Whether a job is running."""
         return self._call is not None
 
     @property
     def waitables(self) -> list[Connection | int]:
+        """What `multiprocessing.connection.wait` can wait on until there may be news."""
         return self._worker.waitables if self._worker else []
 
     def start(self, function: Callable[[Any], Any], job: Any) -> None:
+        """Start calling a picklable function on a job."""
         self._call = (function, job)
         self._tries = self._faults = self._kills = self._starts_killed = 0
         self._ran_s = 0.0
         self._try()
 
     def poll(self) -> Outcome[Any, Any] | None:
-        """The outcome of the job, once it has one."""
+        """The outcome of the job, None while it is running."""
         assert self._call is not None
         assert self._worker is not None
         if not self._worker.poll():
@@ -93,7 +96,7 @@ class Supervisor:
         return outcome
 
     def stop(self) -> None:
-        """End the process, and the job with it."""
+        """End the process and its job."""
         if self._worker:
             self._worker.stop()
         self._worker, self._call, self._jobs_done = None, None, 0
@@ -108,7 +111,7 @@ class Supervisor:
 
     @property
     def _most_s(self) -> float:
-        """What a job that hangs is given when nobody kills it, and so all that one is given which is killed."""
+        """The time for all attempts of a job together, those that are killed from outside included."""
         return self.policy.attempts * self.policy.limits.timeout_s
 
     def _hanging_sentence(self) -> str:

@@ -1,4 +1,4 @@
-"""A data set in the layouts of others: one module a format with a function that writes it."""
+"""Exporting data sets to the layouts of others, one module for each format."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datagen.dataset.samples import StereoDataset
 from datagen.export.kitti import export_kitti
 from datagen.export.sceneflow import export_sceneflow
-from datagen.export.shards import export_webdataset
+from datagen.export.webdataset import export_webdataset
 from stereoforge_kit.files import Tree
 
 
@@ -15,14 +15,15 @@ class ExportOptions:
     """What some formats let the user choose."""
 
     frames_per_shard: int = 256
-    """webdataset: samples in one tar file."""
+    """webdataset: number of samples in one tar file."""
     lidar_beams: int | None = None
-    """kitti: keep only the disparities that a scanner with so many beams would measure."""
+    """kitti: keep only the disparities that a laser scanner with so many beams would measure; None for all."""
 
 
 Progress = Callable[[int, int], None]
+"""Called with (frames done, frames in all)."""
 Exporter = Callable[[Sequence[StereoDataset], Tree, ExportOptions, Progress], None]
-"""Writes all frames of some splits of one data set into a tree, calling back with (frames done, in all)."""
+"""Writes all frames of some splits of one data set into a folder or URL."""
 
 EXPORTERS: dict[str, Exporter] = {
     "kitti": lambda sets, out, options, progress: export_kitti(sets, out, options.lidar_beams, progress),
@@ -31,6 +32,6 @@ EXPORTERS: dict[str, Exporter] = {
         sets, out, options.frames_per_shard, progress
     ),
 }
-"""Every format by the name it has on the command line."""
+"""Every exporter by the name of its format on the command line."""
 
 __all__ = ["EXPORTERS", "ExportOptions", "Exporter", "Progress"]

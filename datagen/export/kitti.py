@@ -1,11 +1,11 @@
 """The layout of KITTI 2015's stereo benchmark (Menze and Geiger, CVPR 2015; its devkit's readme and io code).
 
     training/image_2/000000_10.png       left image            training/image_3/...   right image
-    training/disp_occ_0/000000_10.png    all pixels            training/disp_noc_0/... those the other eye sees
+    training/disp_occ_0/000000_10.png    all pixels            training/disp_noc_0/... pixels visible in the right view
     training/obj_map/000000_10.png       0 background, else a vehicle's number (KITTI's foreground is its cars)
     training/calib_cam_to_cam/000000.txt projections of both cameras
 
-Disparity is 16-bit PNG, 256 times the pixels; 0 is invalid, which the sky therefore is.
+The disparity is a 16-bit PNG file of 256 times the pixels. 0 is invalid, and so is the sky.
 """
 
 from __future__ import annotations
@@ -18,17 +18,16 @@ from numpy.typing import NDArray
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.export.lidar import lidar_mask
 from datagen.formats import write_png
-from datagen.sources.kitti import FRAME_LIST
+from datagen.sources.kitti import FRAME_LIST, UNITS_PER_PX
 from scenes.shapes.street.vehicles import VEHICLE_PARTS
 from scenes.spec import Scene
 from scenes.streets.traffic import vehicle_of
 from stereoforge_kit.files import Tree
 
 FOLDERS = {"train": "training", "val": "validation", "test": "testing"}
-"""KITTI has no validation set and keeps the ground truth of its testing set to itself; here all have it."""
-SCALE = 256.0
+"""The folder of each split. KITTI has no validation set and no ground truth of its testing set; here all have it."""
 VEHICLE_NUMBERS = 255
-"""An object map is 8-bit: after so many the numbers begin again at 1, so that no vehicle becomes background."""
+"""Numbers in an object map, which has 8 bits. After so many vehicles they begin again at 1; 0 is background."""
 
 
 def export_kitti(
@@ -37,7 +36,17 @@ def export_kitti(
     lidar_beams: int | None,
     progress: Callable[[int, int], None],
 ) -> None:
-    """Write the frames of each split, numbered from 0, and `frames.txt` with the name of each."""
+    """Write the frames of each split, numbered from 0, and `frames.txt` with their names.
+
+    Args:
+        sets: One data set for each split.
+        out: The folder or URL to write to.
+        lidar_beams: Keep only what a laser scanner with so many beams would measure; None for all pixels.
+        progress: Called with (frames done, frames in all).
+
+    Raises:
+        DatasetError: For damaged files.
+    """
     total, done = sum(map(len, sets)), 0
     for frames in sets:
         folder, names = FOLDERS[frames.split], []
@@ -50,17 +59,21 @@ def export_kitti(
 
 
 def encode_disparity(disparity: NDArray[np.float32], keep: NDArray[np.bool_]) -> NDArray[np.uint16]:
-    """(H, W) px to KITTI's numbers; 0 where not kept, not finite, zero (infinitely far) or too large to store."""
-    scaled = np.rint(np.nan_to_num(disparity).astype(np.float64) * SCALE)
+    """(H, W) uint16 KITTI numbers of a disparity (H, W) in px.
+
+    They are 0 where the mask `keep` (H, W) is False and where the disparity is not finite, 0 (infinitely far) or too
+    large to store.
+    """
+    scaled = np.rint(np.nan_to_num(disparity).astype(np.float64) * UNITS_PER_PX)
     storable = keep & (disparity > 0) & (scaled <= np.iinfo(np.uint16).max)
-    # Something valid must not become invalid by rounding; KITTI's own writer raises it to 1 too.
+    # A valid disparity must not become invalid by rounding; KITTI's own writer raises it to 1 too.
     return np.where(storable, np.maximum(scaled, 1), 0).astype(np.uint16)
 
 
 def vehicle_numbers(scene: Scene) -> NDArray[np.uint8]:
-    """(objects + 1,) the number in an object map of every object index, 0 for what is no part of a vehicle.
+    """(objects + 1,) the number in KITTI's object map for every object index.
 
-    Body, glass, lamps and wheels of one vehicle share a number.
+    It is 0 for what is no part of a vehicle. Body, glass, lamps and wheels of one vehicle share a number.
     """
     numbers = np.zeros(len(scene.objects) + 1, np.uint8)
     seen: dict[str, int] = {}
@@ -92,7 +105,7 @@ def _write_frame(out: Tree, folder: str, number: int, sample: StereoSample, lida
 
 
 def _calibration(focal_px: float, width: int, height: int, baseline_m: float) -> str:
-    """The rectified projections, with KITTI's pixel centres at whole numbers."""
+    """The rectified projections. KITTI has pixel centres at whole numbers."""
     center = ((width - 1) / 2, (height - 1) / 2)
     lines = []
     for camera, offset in (("02", 0.0), ("03", -focal_px * baseline_m)):

@@ -1,24 +1,34 @@
-"""Which pixels a spinning laser scanner at the left eye would measure."""
+"""The pixels that a spinning laser scanner at the left camera would measure."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stereoforge_kit.errors import InputError
+
 ELEVATION_DEG = (-24.9, 2.0)
-"""Lowest and highest beam of the scanner KITTI used, a Velodyne HDL-64E."""
+"""Lowest and highest beam of KITTI's scanner, a Velodyne HDL-64E."""
 AZIMUTH_STEP_DEG = 0.18
-"""Between two measurements of one beam at 10 turns a second."""
+"""Angle between two measurements of one beam at 10 turns per second."""
 
 
 def lidar_mask(height: int, width: int, focal_px: float, beams: int) -> NDArray[np.bool_]:
-    """(H, W) True in the pixels that a beam meets.
+    """(H, W) True in the pixels that a beam hits.
 
-    The beams are spread evenly in elevation, each measures in even steps of azimuth, and the scanner stands
-    where the camera does, upright and looking the same way. Raises ValueError for fewer than one beam.
+    The beams are spread evenly in elevation, and each measures in even steps of azimuth. The scanner is at the camera,
+    upright and with the same direction.
+
+    Args:
+        height, width: The image's size in pixels.
+        focal_px: The camera's focal length in pixels.
+        beams: Number of beams.
+
+    Raises:
+        ValueError: For fewer than one beam.
     """
     if beams < 1:
-        raise ValueError(f"a laser scanner has at least one beam, got {beams}")
+        raise InputError(f"a laser scanner has at least one beam, got {beams}")
     half_field = np.degrees(np.arctan2(width / 2, focal_px))
     azimuth = np.radians(np.arange(-half_field, half_field, AZIMUTH_STEP_DEG))
     elevation = np.radians(np.linspace(*ELEVATION_DEG, beams))

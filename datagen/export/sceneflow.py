@@ -1,6 +1,7 @@
-"""FlyingThings3D as its makers published it: the images, disparities and poses, and nothing else.
+"""FlyingThings3D as it was published (Mayer et al., CVPR 2016): images, disparities and poses, and nothing else.
 
-The data set itself has that layout already; this is a copy of that part of it, for a tool that minds the rest.
+A data set of StereoForge already has this layout. The export copies that part of it, for tools that stumble over the
+rest.
 """
 
 from __future__ import annotations
@@ -14,11 +15,15 @@ from datagen.dataset.manifest import read_manifest
 from datagen.dataset.samples import StereoDataset
 from stereoforge_kit.files import Tree
 
-KINDS = (*RENDER_PASSES.values(), "disparity", "camera_data")
+PUBLISHED_KINDS = (*RENDER_PASSES.values(), "disparity", "camera_data")
+"""The kinds of files that are copied."""
 
 
 def export_sceneflow(sets: Sequence[StereoDataset], out: Tree, progress: Callable[[int, int], None]) -> None:
-    """Copy the files of each scene, their bytes unchanged."""
+    """Copy the files of each scene with their bytes unchanged. Raises DatasetError for damaged files.
+
+    progress: Called with (frames done, frames in all).
+    """
     total, done = sum(map(len, sets)), 0
     for frames in sets:
         layout = frames.layout
@@ -26,7 +31,7 @@ def export_sceneflow(sets: Sequence[StereoDataset], out: Tree, progress: Callabl
             samples = list(group)
             manifest = read_manifest(layout.local(layout.manifest(frames.split, scene)))
             for entry in manifest.files:
-                if Path(entry.path).parts[0] in KINDS:
+                if Path(entry.path).parts[0] in PUBLISHED_KINDS:
                     out.write(entry.path, samples[0].intact(layout.root / entry.path).read_bytes())
             done += len(samples)
             progress(done, total)

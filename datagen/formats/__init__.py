@@ -1,8 +1,9 @@
-"""The files a data set is made of, one module a format.
+"""Readers and writers of the files in a data set, one module for each format.
 
-Every reader checks the header, and that the file has exactly the bytes the header promises, before it
-allocates anything; whatever is wrong raises `datagen.errors.FormatError`, one sentence that names the file.
-Every writer replaces its target in one step and gives the same bytes for the same array.
+Arrays have row 0 at the top. A reader checks the header, and that the file has exactly the bytes that the header
+promises, before it allocates anything. Whatever is wrong raises `datagen.errors.FormatError` with one sentence
+that names the file; so does an array that the format cannot hold. A writer replaces its target in one step and
+gives the same bytes for the same array.
 """
 
 from datagen.formats.camera_data import read_camera_data, write_camera_data

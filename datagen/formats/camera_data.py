@@ -1,10 +1,10 @@
-"""Camera poses as text, in the format of FlyingThings3D's `camera_data.txt`.
+"""Camera poses as text, in the format of FlyingThings3D's `camera_data.txt` (Mayer et al., CVPR 2016).
 
     Frame 6
     L T00 T01 ... T33
     R T00 T01 ... T33
 
-and an empty line after each frame; T is the row-major (4, 4) camera-to-world matrix of that eye.
+An empty line follows each frame. T is the (4, 4) camera-to-world matrix of that view, row by row, in metres.
 """
 
 from __future__ import annotations
@@ -17,13 +17,32 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats.limits import read_bounded
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_bytes
 
 Matrix = NDArray[np.float64]
 
 
 def write_camera_data(path: Path | str, poses: Mapping[int, tuple[Matrix, Matrix]]) -> None:
-    """Write the (left, right) camera-to-world matrices of each frame number, exact to the last bit."""
+    """Write the (left, right) camera-to-world matrices of each frame, exact to the last bit.
+
+    Args:
+        path: The file to write.
+        poses: For each frame number the two (4, 4) matrices, float64, translations in metres.
+
+    Raises:
+        FormatError: For a matrix of another shape.
+
+    >>> import tempfile
+    >>> left, right = np.eye(4), np.eye(4)
+    >>> right[0, 3] = 0.25  # The right camera is 0.25 m to the right.
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "camera_data.txt"
+    ...     write_camera_data(path, {6: (left, right)})
+    ...     poses = read_camera_data(path)
+    >>> list(poses), poses[6][1][:3, 3].tolist()
+    ([6], [0.25, 0.0, 0.0])
+    """
     path = Path(path)
     blocks = []
     for frame, (left, right) in sorted(poses.items()):
@@ -36,7 +55,10 @@ def write_camera_data(path: Path | str, poses: Mapping[int, tuple[Matrix, Matrix
 
 
 def read_camera_data(path: Path | str) -> dict[int, tuple[Matrix, Matrix]]:
-    """Read the (left, right) camera-to-world matrices, (4, 4), by frame number. Raises FormatError."""
+    """Read the (left, right) camera-to-world matrices, (4, 4) float64 in metres, by frame number.
+
+    Raises FormatError for a file that is missing, cut off or not of this format. `write_camera_data` has an example.
+    """
     path = Path(path)
     try:
         text = read_bounded(path).decode("ascii")
@@ -64,14 +86,14 @@ def _numbers(matrix: Matrix) -> str:
     return " ".join(repr(float(value)) for value in matrix.flat)
 
 
-def _matrix(path: Path, frame: int, eye: str, line: str) -> Matrix:
+def _matrix(path: Path, frame: int, view: str, line: str) -> Matrix:
     words = line.split()
     try:
-        if words[0] != eye:
-            raise ValueError(f"it begins with {words[0][:20]!r}")
+        if words[0] != view:
+            raise InputError(f"it begins with {words[0][:20]!r}")
         matrix = np.array([float(word) for word in words[1:]]).reshape(4, 4)
         if not np.isfinite(matrix).all():
-            raise ValueError("it is not finite")
+            raise InputError("it is not finite")
     except ValueError as error:
-        raise FormatError(f"{path}: frame {frame} has no valid {eye!r} matrix: {error}") from error
+        raise FormatError(f"{path}: frame {frame} has no valid {view!r} matrix: {error}") from error
     return matrix

@@ -1,8 +1,7 @@
 """OpenEXR files of float32 channels: scan lines from the top down, ZIP compression, one part.
 
-OpenEXR's reader takes a file at its word and allocates what the header declares, so the header and the table
-of chunks are checked here first against the exact layout that `write_channels` makes
-(openexr.com/en/latest/OpenEXRFileLayout.html).
+OpenEXR's reader trusts a file and allocates what its header declares. So the header and the table of chunks are
+first compared with the exact layout that `write_channels` makes (openexr.com/en/latest/OpenEXRFileLayout.html).
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats.limits import check_image_size, read_bounded
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import replacing
 
 _MAGIC_AND_VERSION = struct.pack("<II", 20000630, 2)
@@ -38,13 +38,21 @@ _ATTRIBUTE_TYPES = {
     "screenWindowWidth": "float",
     "type": "string",
 }
-"""All that such a file needs; OpenEXR prints warnings about others that we could not turn into an error."""
+"""All attributes that such a file needs. OpenEXR only prints warnings about others, which cannot become errors."""
 
 
 def read_channels(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[np.float32]]:
-    """Read a file of exactly these channels, each (H, W) float32. Raises FormatError.
+    """Read a file that has exactly these channels.
 
-    names: In alphabetical order, the order of channels in a file.
+    Args:
+        path: An EXR file as `write_channels` writes it.
+        names: The channels in alphabetical order, which is their order in a file.
+
+    Returns:
+        Each channel, (H, W) float32, by its name.
+
+    Raises:
+        FormatError: For a file that is missing, damaged or of another layout.
     """
     data = read_bounded(path)
     width, height = _check_layout(path, data, names)
@@ -59,7 +67,16 @@ def read_channels(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[np.fl
 
 
 def write_channels(path: Path, planes: Mapping[str, NDArray[Any]]) -> None:
-    """Write (H, W) numbers by channel name, names in alphabetical order."""
+    """Write channels, each (H, W) and stored as float32, by their names in alphabetical order.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "planes.exr"
+    ...     write_channels(path, {"x": np.ones((2, 3)), "y": np.zeros((2, 3))})
+    ...     planes = read_channels(path, ("x", "y"))
+    >>> planes["x"].shape, planes["x"].dtype.name, planes["y"].max().item()
+    ((2, 3), 'float32', 0.0)
+    """
     channels = {name: np.ascontiguousarray(plane, np.float32) for name, plane in planes.items()}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with replacing(path) as temporary:
@@ -86,7 +103,7 @@ def _check_layout(path: Path, data: bytes, names: tuple[str, ...]) -> tuple[int,
 
 
 def _parse_attributes(data: bytes) -> tuple[dict[str, bytes], int]:
-    """The header's attributes by name, and where the table of chunks begins. ValueError says what is odd."""
+    """The header's attributes by name, and where the table of chunks begins. Raises ValueError for a damaged header."""
     attributes: dict[str, bytes] = {}
     position = len(_MAGIC_AND_VERSION)
     while data[position : position + 1] != b"\0":
@@ -96,7 +113,7 @@ def _parse_attributes(data: bytes) -> tuple[dict[str, bytes], int]:
         end = type_end + 5 + size
         name, kind = data[position:name_end].decode("ascii"), data[name_end + 1 : type_end].decode("ascii")
         if _ATTRIBUTE_TYPES.get(name) != kind or name in attributes or end >= len(data):
-            raise ValueError(f"attribute {name!r} is unknown, repeated or too long")
+            raise InputError(f"attribute {name!r} is unknown, repeated or too long")
         attributes[name] = data[type_end + 5 : end]
         position = end
     return attributes, position + 1
@@ -137,7 +154,7 @@ def _check_chunks(path: Path, data: bytes, table: int, line_bytes: int, top: int
 def _inflates(packed: bytes, raw_size: int) -> bool:
     """Whether a chunk is one zlib stream of the right size and checksum.
 
-    OpenEXR would print a warning and give no pixels. A chunk that is not smaller packed is stored as it is.
+    OpenEXR would only print a warning and return no pixels. A chunk that compression does not shrink is stored raw.
     """
     stream = zlib.decompressobj()
     try:

@@ -1,4 +1,4 @@
-"""Reading bytes from a file nobody vouches for: sizes are checked before memory is taken."""
+"""Reading untrusted files: sizes are checked before memory is allocated."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ from pathlib import Path
 from datagen.errors import FormatError
 
 MAX_ELEMENTS = 2**28
-"""Most numbers an array may have, 1 GiB of float32: a header that promises more is damage, not data."""
+"""Most numbers an array may have, 1 GiB of float32. A header that promises more is damaged."""
 MAX_FILE_BYTES = 2**31
+"""Largest file that is read."""
 MAX_JSON_BYTES = 2**25
-"""Parsed, JSON takes up to twenty times its size; no record of a data set comes near this."""
+"""Largest JSON file that is read. Parsed, JSON takes up to twenty times its size; no record comes near this limit."""
 
 
 def read_bounded(path: Path, most_bytes: int = MAX_FILE_BYTES) -> bytes:
-    """The whole content of a file. Raises FormatError if it cannot be read, is no file, or is larger than that."""
+    """The whole content of a file.
+
+    Raises FormatError for a file that cannot be read, is no regular file, or is larger than `most_bytes`.
+    """
     try:
         size = require_regular(path).st_size
         if size > most_bytes:
@@ -27,7 +31,10 @@ def read_bounded(path: Path, most_bytes: int = MAX_FILE_BYTES) -> bytes:
 
 
 def require_regular(path: Path) -> os.stat_result:
-    """The file's status. Raises FormatError for a pipe or a device, which would be read without end, and OSError."""
+    """The status of a regular file.
+
+    Raises FormatError for a pipe or a device, which would be read without end, and OSError for no file at all.
+    """
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
         raise FormatError(f"{path}: cannot be read: it is no regular file")
@@ -35,7 +42,7 @@ def require_regular(path: Path) -> os.stat_result:
 
 
 def check_image_size(origin: Path | str, width: int, height: int, channels: int) -> None:
-    """Raise FormatError unless an image of this size is not empty and within `MAX_ELEMENTS`."""
+    """Raise FormatError, naming `origin`, for an image that is empty or has more than `MAX_ELEMENTS` numbers."""
     if width <= 0 or height <= 0:
         raise FormatError(f"{origin}: its header declares an image of {width} x {height} pixels")
     if width * height * channels > MAX_ELEMENTS:

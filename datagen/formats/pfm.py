@@ -1,8 +1,8 @@
-"""Portable float maps: the disparity files of FlyingThings3D, Middlebury and ETH3D.
+"""Portable float maps (PFM): the disparity files of FlyingThings3D, Middlebury and ETH3D.
 
-A text header of three words (`Pf` one channel or `PF` three; width and height; a scale whose sign tells the
-byte order, negative for little endian), then float32 rows from the bottom of the image to the top
-(P. Debevec's format, pauldebevec.com/Research/HDR/PFM).
+A text header gives the number of channels (`Pf` one, `PF` three), the width and height, and a scale whose sign tells
+the byte order (negative for little endian). Float32 rows follow, from the bottom of the image to the top. The format
+is Paul Debevec's (pauldebevec.com/Research/HDR/PFM).
 """
 
 from __future__ import annotations
@@ -25,14 +25,19 @@ _HEADER = re.compile(rb"(P[fF])\s{1,8}(\d{1,9})\s{1,8}(\d{1,9})\s{1,8}(\S{1,32})
 def read_pfm(path: Path | str) -> NDArray[np.float32]:
     """Read a float map: (H, W) or (H, W, 3) float32, row 0 at the top.
 
-    The scale's magnitude is not applied: Middlebury writes 1/255 there above disparities that are in
-    pixels already, and no stereo benchmark's reader multiplies by it. Raises FormatError.
+    The scale's magnitude is not applied: Middlebury writes 1/255 there, though its disparities are in pixels
+    already, and no stereo benchmark's reader multiplies by it. Raises FormatError for a file that is missing,
+    damaged or no PFM file. `write_pfm` has an example.
     """
     return decode_pfm(read_bounded(Path(path)), str(path))
 
 
 def decode_pfm(data: bytes, origin: str) -> NDArray[np.float32]:
-    """`read_pfm` of a file's content; `origin` names it in errors."""
+    """Decode the content of a PFM file as `read_pfm` does; `origin` names the file in errors.
+
+    >>> decode_pfm(b"Pf 2 1 -1 " + np.array([1.5, 2.5], "<f4").tobytes(), "tiny.pfm").tolist()
+    [[1.5, 2.5]]
+    """
     header = _HEADER.match(data)
     if header is None:
         raise FormatError(f"{origin}: is not a PFM file, its header does not parse")
@@ -48,7 +53,19 @@ def decode_pfm(data: bytes, origin: str) -> NDArray[np.float32]:
 
 
 def write_pfm(path: Path | str, array: NDArray[np.floating[Any]]) -> None:
-    """Write (H, W) or (H, W, 3) numbers, row 0 at the top, as little-endian float32 of scale -1."""
+    """Write (H, W) or (H, W, 3) numbers, row 0 at the top, as little-endian float32 of scale -1.
+
+    Raises FormatError for an array of another shape, or an empty one.
+
+    >>> import tempfile
+    >>> disparity = np.array([[10.5, np.nan], [0.0, 3.25]], np.float32)  # In pixels; NaN is invalid.
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "disparity.pfm"
+    ...     write_pfm(path, disparity)
+    ...     again = read_pfm(path)
+    >>> again.tolist()
+    [[10.5, nan], [0.0, 3.25]]
+    """
     path = Path(path)
     if array.size == 0 or not (array.ndim == 2 or (array.ndim == 3 and array.shape[2] == 3)):
         raise FormatError(f"{path}: a PFM file holds (H, W) or (H, W, 3) numbers, not {array.shape}")

@@ -1,4 +1,4 @@
-"""Masks as binary portable grey maps (`P5`, 8 bits): 0 and 255, as FlyingThings3D's motion boundaries."""
+"""Masks as binary portable grey maps (PGM, `P5`, 8 bits) of 0 and 255, as FlyingThings3D's motion boundaries."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ _HEADER = re.compile(rb"P5\s{1,8}(\d{1,9})\s{1,8}(\d{1,9})\s{1,8}255\s")
 
 
 def read_mask(path: Path | str) -> NDArray[np.bool_]:
-    """Read an (H, W) mask: True where the grey is 255. Raises FormatError, also for greys between."""
+    """Read an (H, W) bool mask, True where the grey is 255.
+
+    Raises FormatError for a file that is missing, damaged, no 8-bit PGM file, or has greys other than 0 and 255.
+    `write_mask` has an example.
+    """
     path = Path(path)
     data = read_bounded(path)
     header = _HEADER.match(data)
@@ -34,7 +38,16 @@ def read_mask(path: Path | str) -> NDArray[np.bool_]:
 
 
 def write_mask(path: Path | str, mask: NDArray[np.bool_]) -> None:
-    """Write an (H, W) mask."""
+    """Write an (H, W) bool mask. Raises FormatError for an array of another shape or type.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "motion_boundaries.pgm"
+    ...     write_mask(path, np.array([[True, False]]))
+    ...     content, again = path.read_bytes(), read_mask(path)
+    >>> content, again.tolist()
+    (b'P5\\n2 1\\n255\\n\\xff\\x00', [[True, False]])
+    """
     path = Path(path)
     if mask.ndim != 2 or mask.size == 0 or mask.dtype != np.bool_:
         raise FormatError(f"{path}: a mask is (H, W) bool, not {mask.shape} of {mask.dtype}")

@@ -1,4 +1,4 @@
-"""Pictures of other people's data sets: PNG, JPEG and the portable maps PGM and PPM."""
+"""The image files of other people's data sets: PNG, JPEG and the portable maps PGM and PPM."""
 
 from __future__ import annotations
 
@@ -19,14 +19,22 @@ _PNM_HEADER = re.compile(rb"P([56])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\
 _JPEG_STANDALONE = {0x01, *range(0xD0, 0xD8)}
 _JPEG_FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
 _MOST_JPEG_SEGMENTS = 100_000
-"""Bytes that fill count as one each."""
+"""Fill bytes count as one segment each."""
 _JPEG_END = b"\xff\xd9"
 
 
 def read_picture(path: Path | str) -> NDArray[np.uint8]:
-    """Read a picture as (H, W, 3) uint8 RGB: grey is repeated, alpha dropped, 16 bits are scaled to 8.
+    """Read an image as (H, W, 3) uint8 RGB: grey is repeated, alpha dropped, 16 bits are scaled to 8.
 
-    Raises FormatError for a file that is none of PNG, JPEG, PGM and PPM, or is damaged.
+    Raises FormatError for a file that is missing, damaged, or none of PNG, JPEG, PGM and PPM.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "grey.pgm"
+    ...     _ = path.write_bytes(b"P5 2 1 255\\n" + bytes([7, 200]))
+    ...     image = read_picture(path)
+    >>> image.tolist()
+    [[[7, 7, 7], [200, 200, 200]]]
     """
     path = Path(path)
     pixels = read_jpeg(path) if path.suffix.lower() in (".jpg", ".jpeg") else read_raster(path)
@@ -38,13 +46,20 @@ def read_picture(path: Path | str) -> NDArray[np.uint8]:
 
 
 def read_raster(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """Read a PNG, PGM or PPM as its numbers are: (H, W) or (H, W, C), uint8 or uint16. Raises FormatError."""
+    """Read the numbers of a PNG, PGM or PPM file unchanged: (H, W) or (H, W, C), uint8 or uint16.
+
+    Raises FormatError for a file that is missing, damaged or none of these.
+    """
     path = Path(path)
     return read_pnm(path) if path.suffix.lower() in (".pgm", ".ppm") else read_png(path)
 
 
 def read_pnm(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """Read a binary PGM, (H, W), or PPM, (H, W, 3); 16-bit numbers are big endian there. Raises FormatError."""
+    """Read a binary PGM file, (H, W), or PPM file, (H, W, 3), as uint8 or uint16.
+
+    16-bit numbers are big endian in these files (netpbm.sourceforge.net/doc/pgm.html). Raises FormatError for a
+    file that is missing, damaged or neither.
+    """
     path = Path(path)
     data = read_bounded(path)
     header = _PNM_HEADER.match(data)
@@ -65,7 +80,7 @@ def read_pnm(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
 
 
 def read_jpeg(path: Path | str) -> NDArray[np.uint8]:
-    """Read a JPEG as (H, W, 3) RGB. Raises FormatError."""
+    """Read a JPEG file as (H, W, 3) uint8 RGB. Raises FormatError for a file that is missing, damaged or none."""
     path = Path(path)
     data = read_bounded(path)
     check_image_size(path, *_jpeg_size(path, data), channels=3)

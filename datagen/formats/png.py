@@ -21,15 +21,16 @@ _COMPRESSION_LEVEL = 1
 
 
 def read_png(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """Read a PNG: (H, W) grey or (H, W, 3) RGB, (H, W, 4) with an alpha channel; uint8 or uint16.
+    """Read a PNG file: (H, W) grey, (H, W, 3) RGB or (H, W, 4) RGB with alpha; uint8 or uint16.
 
-    Every chunk's checksum is compared, so an accidental change of any byte is found. Raises FormatError.
+    Every chunk's checksum is compared, so a change of any byte is found. Raises FormatError for a file that is
+    missing, damaged, animated or no PNG file. `write_png` has an example.
     """
     return decode_png(read_bounded(Path(path)), str(path))
 
 
 def decode_png(data: bytes, origin: str) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """`read_png` of a file's content; `origin` names it in errors."""
+    """Decode the content of a PNG file as `read_png` does; `origin` names the file in errors."""
     _check_chunks(origin, data)
     image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
@@ -40,7 +41,7 @@ def decode_png(data: bytes, origin: str) -> NDArray[np.uint8] | NDArray[np.uint1
 
 
 def read_png_size(path: Path | str) -> tuple[int, int]:
-    """(height, width) from a PNG's header alone. Raises FormatError."""
+    """Read only the header of a PNG file: (height, width) in pixels. Raises FormatError as `read_png` does."""
     path = Path(path)
     try:
         require_regular(path)
@@ -56,7 +57,19 @@ def read_png_size(path: Path | str) -> tuple[int, int]:
 
 
 def write_png(path: Path | str, array: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
-    """Write (H, W) grey or (H, W, 3) RGB values of type uint8 or uint16."""
+    """Write (H, W) grey or (H, W, 3) RGB values of type uint8 or uint16.
+
+    Raises FormatError for an array of another shape or type, or an empty one.
+
+    >>> import tempfile
+    >>> object_index = np.array([[0, 1], [2, 40_000]], np.uint16)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "object_index.png"
+    ...     write_png(path, object_index)
+    ...     size, again = read_png_size(path), read_png(path)
+    >>> size, again.dtype.name, again.tolist()
+    ((2, 2), 'uint16', [[0, 1], [2, 40000]])
+    """
     path = Path(path)
     shape_fits = array.ndim == 2 or (array.ndim == 3 and array.shape[2] == 3)
     if array.size == 0 or not shape_fits or array.dtype not in (np.uint8, np.uint16):

@@ -1,1 +1,1 @@
-"""A data set as a page to look at, and two data sets side by side."""
+"""HTML pages that show a data set, or compare two."""

@@ -1,4 +1,4 @@
-"""Two data sets' statistics side by side: the start of any study of the gap between two domains."""
+"""Comparing the statistics of two data sets: the start of a domain-gap study."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from stereoforge_kit.viewing import Picture, render_page, shrunk
 from stereoforge_kit.viewing.plots import svg
 
 SHOWN_FRAMES = 6
-"""Pictures of each set."""
+"""Number of pictures of each set."""
 
 
 @dataclass(frozen=True)
-class _Side:
+class _ComparedSet:
     """One of the two sets."""
 
     name: str
-    """The folder's name, made unlike the other's."""
+    """The folder's name, with as much of its path as makes it differ from the other's."""
     lead: str
     samples: list[StereoSample]
     pictures: list[Picture]
@@ -53,29 +53,29 @@ def write_comparison(
     scenes: int = SHOWN_FRAMES,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Write one page with the statistics of two data sets, all their splits together, side by side.
+    """Write a page that compares the statistics of two data sets, with all their splits together.
 
     Args:
         first, second: The data sets' folders.
-        out_html: The file to write; it needs nothing beside it.
-        scenes: At most so many pictures of each set, and not more than `SHOWN_FRAMES`.
+        out_html: The file to write. It needs no other file and opens from disk.
+        scenes: Number of pictures of each set, at most `SHOWN_FRAMES`.
         progress: Called with (frames read, frames in all).
 
     Raises:
         DatasetError: For a folder that is no data set or has no finished scene, or for damaged files.
     """
     names = _names(Path(first), Path(second))
-    sides = [
-        _side(Path(root), name, min(scenes, SHOWN_FRAMES))
+    compared = [
+        _compared_set(Path(root), name, min(scenes, SHOWN_FRAMES))
         for root, name in zip((first, second), names, strict=True)
     ]
-    tick = Ticker(sum(len(side.samples) for side in sides), progress)
-    statistics = {side.name: measure(map(tick, side.samples)) for side in sides}
+    tick = Ticker(sum(len(one.samples) for one in compared), progress)
+    statistics = {one.name: measure(map(tick, one.samples)) for one in compared}
     page = render_page(
         "datagen.gallery",
         "comparison.html",
         title=f"{names[0]} and {names[1]}",
-        sides=sides,
+        compared=compared,
         rows=_rows(*statistics.values()),
         plots=[svg(figure) for figure in histograms(statistics)],
         measured=[len(one) for one in statistics.values()],
@@ -84,7 +84,7 @@ def write_comparison(
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
-    """The folders' names, with as much of their parents' as tells them apart."""
+    """The folders' names, with as much of their paths as tells them apart."""
     one, two = first.resolve().parts, second.resolve().parts
     for length in range(1, max(len(one), len(two)) + 1):
         names = "/".join(one[-length:]), "/".join(two[-length:])
@@ -93,7 +93,7 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
     return f"{names[0]} (1)", f"{names[1]} (2)"
 
 
-def _side(root: Path, name: str, shown: int) -> _Side:
+def _compared_set(root: Path, name: str, shown: int) -> _ComparedSet:
     layout = open_layout(root)
     recipe = read_recipe(layout.recipe)
     splits = [split for split in SPLITS if layout.committed_scenes(split)]
@@ -102,15 +102,15 @@ def _side(root: Path, name: str, shown: int) -> _Side:
     frames = [sample for split in splits for sample in StereoDataset(root, split, recipe.passes[0])]
     lead = f"{recipe.family} at {recipe.world.width} × {recipe.world.height}, {len(frames)} stereo pairs"
     pictures = [shrunk(sample.left, LONGEST_SIDE_PX) for sample in evenly_spaced(frames, shown)]
-    return _Side(name, lead, evenly_spaced(frames, MEASURED_FRAMES), pictures)
+    return _ComparedSet(name, lead, evenly_spaced(frames, MEASURED_FRAMES), pictures)
 
 
 def _rows(first: SetStatistics, second: SetStatistics) -> list[_Row]:
-    """Median and spread of every quantity in both, and how far apart the distributions are."""
+    """Median and spread of every quantity in both sets, and the distance of the two distributions."""
     quantities = (
         ("Disparity of a pixel, px", "disparity", 1.0, 1),
-        ("Pixels hidden from the other eye, %", "occluded", 100.0, 1),
-        ("Pixels outside the other frame, %", "out_of_frame", 100.0, 1),
+        ("Occluded pixels, %", "occluded", 100.0, 1),
+        ("Pixels out of frame, %", "out_of_frame", 100.0, 1),
         ("Objects in view", "visible_objects", 1.0, 0),
         ("Textured pixels, %", "textured", 100.0, 0),
     )

@@ -1,4 +1,4 @@
-"""A data set to look at: one HTML file that opens from disk, with pictures of some scenes and statistics."""
+"""The gallery of a data set: one HTML file with pictures of some scenes and statistics."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ from stereoforge_kit.viewing.plots import histogram, svg
 T = TypeVar("T")
 
 LONGEST_SIDE_PX = 480
-"""Pictures in the page are not larger; a gallery of 24 scenes then stays below 10 MB."""
+"""Larger pictures are made smaller, so that a gallery of 24 scenes stays below 10 MB."""
 FULL_COLOR_GRADIENT = 0.25
-"""Gradient, px a pixel, that is drawn in full colour."""
+"""Gradient in px per px that is drawn in full colour."""
 FULL_COLOR_FLOW = 0.025
 """Flow, as a share of the image width, that is drawn in full colour."""
 FULL_COLOR_CHANGE = 0.005
 """Change of disparity, as a share of the image width, that is drawn brightest."""
 MEASURED_FRAMES = 100
-"""Statistics are of at most so many frames of each split, evenly spaced."""
+"""Statistics are computed from at most so many frames of each split, evenly spaced."""
 
 
 @dataclass(frozen=True)
 class FramePanel:
-    """The pictures of one frame and what to say about it."""
+    """The pictures of one frame and a summary."""
 
     name: str
     summary: str
@@ -69,8 +69,8 @@ def write_gallery(
 
     Args:
         root: The data set's folder.
-        out_html: The file to write; it needs nothing beside it.
-        scenes: How many scenes to show, evenly spaced over all finished ones, the first frame of each.
+        out_html: The file to write. It needs no other file and opens from disk.
+        scenes: Number of scenes to show by their first frames, evenly spaced over all finished ones.
         render_pass: Which images to show, "clean" or "final".
         progress: Called with (frames read, frames in all).
 
@@ -116,14 +116,14 @@ def write_gallery(
 
 
 def evenly_spaced(items: Sequence[T], count: int) -> list[T]:
-    """At most `count` of the items, the first and the last among them, in order."""
+    """At most `count` of the items in order, evenly spaced, the first and the last among them."""
     if len(items) <= count:
         return list(items)
     return [items[int(index)] for index in np.linspace(0, len(items) - 1, count).round()]
 
 
 class Ticker:
-    """Passes samples through and reports how many have been."""
+    """Passes samples through and reports how many have passed."""
 
     def __init__(self, total: int, progress: Callable[[int, int], None] | None) -> None:
         self._done, self._total, self._progress = 0, total, progress
@@ -144,12 +144,12 @@ def _first_frames(dataset: StereoDataset) -> list[StereoSample]:
 
 def _panel(sample: StereoSample, recipe: Recipe, nearest_px: float) -> FramePanel:
     low, middle, high = np.percentile(sample.disparity_left, (1, 50, 99))
-    hidden = (sample.occlusion_left > 0).mean()
+    not_visible = (sample.occlusion_left > 0).mean()
     objects = np.count_nonzero(np.unique(sample.object_index_left))
     gradient = np.where(sample.gradient_valid_left[..., None], sample.gradient_left, np.nan)
     pictures: tuple[tuple[str, Picture, int | None], ...] = (
         ("Disparity", disparity_picture(sample.disparity_left, nearest_px), 90),
-        ("Not visible to the right eye", occlusion_picture(sample.occlusion_left, sample.left), 85),
+        ("Not visible in the right view", occlusion_picture(sample.occlusion_left, sample.left), 85),
         ("Disparity gradient", gradient_picture(gradient, FULL_COLOR_GRADIENT), 90),
         ("Objects", index_picture(_thinned(sample.object_index_left)), None),
         *_extra_pictures(sample, recipe),
@@ -158,7 +158,7 @@ def _panel(sample: StereoSample, recipe: Recipe, nearest_px: float) -> FramePane
         name=sample.name,
         summary=(
             f"{objects} objects in view, disparity {low:.1f} to {high:.1f} px (1st to 99th percentile), "
-            f"median {middle:.1f} px; {hidden:.1%} of the left view is not visible to the right eye."
+            f"median {middle:.1f} px; {not_visible:.1%} of the left view is not visible in the right view."
         ),
         left=_small(sample.left),
         right=_small(sample.right),
@@ -167,7 +167,7 @@ def _panel(sample: StereoSample, recipe: Recipe, nearest_px: float) -> FramePane
 
 
 def _extra_pictures(sample: StereoSample, recipe: Recipe) -> list[tuple[str, Picture, int | None]]:
-    """What the recipe asked for beyond the basic targets: the other pass, then surfaces, then motion."""
+    """Pictures of what the recipe asks for besides the basic targets: the other pass, then surfaces, then motion."""
     pictures: list[tuple[str, Picture, int | None]] = [
         (f"The {name} pass", replace(sample, render_pass=name).left, 82)
         for name in recipe.passes
@@ -198,7 +198,7 @@ def _small(picture: Picture) -> Picture:
 
 
 def _thinned(index: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """Every n-th pixel: unlike the mean of colours, each is still an object's own."""
+    """Every n-th pixel. Unlike a mean, each is still the index of an object."""
     step = -(-max(index.shape) // LONGEST_SIDE_PX)
     return index[::step, ::step]
 
@@ -220,8 +220,8 @@ def _tiles(
     values: tuple[tuple[str, str], ...] = (
         (f"{sum(len(layout.committed_scenes(split)) for split in splits)}", "finished scenes"),
         (f"{middle:.1f} px", f"median disparity; 98 % between {low:.1f} and {high:.1f} px"),
-        (f"{joined['occluded'].mean():.1%}", "of the pixels hidden from the other eye"),
-        (f"{joined['out_of_frame'].mean():.1%}", "of the pixels outside the other frame"),
+        (f"{joined['occluded'].mean():.1%}", "of the pixels occluded in the other view"),
+        (f"{joined['out_of_frame'].mean():.1%}", "of the pixels out of the other view's frame"),
         (f"{joined['visible_objects'].mean():.0f}", "objects in view, on average"),
         (f"{joined['textured'].mean():.0%}", "of the pixels textured"),
     )
@@ -234,9 +234,15 @@ def _tiles(
 
 
 def histograms(statistics: dict[str, SetStatistics], wanted: DisparityHistogram | None = None) -> list[Any]:
-    """Histograms of the disparity over pixels and of the other quantities over frames, a line for each name.
+    """Histograms of the disparity over pixels, and of the other quantities over frames.
 
-    `wanted`, if any, is a line beside those of the disparity: all surfaces together, as much as there is of them.
+    Args:
+        statistics: The statistics of each line by its name.
+        wanted: The histogram of disparities asked for, drawn as one more line. It is scaled to the share of pixels
+            that show surfaces.
+
+    Returns:
+        One matplotlib figure for each quantity.
     """
     nearest = max(float(np.percentile(one.disparity, 99.9)) for one in statistics.values())
     edges = np.linspace(0, max(nearest, 1.0), 61)
@@ -251,11 +257,11 @@ def histograms(statistics: dict[str, SetStatistics], wanted: DisparityHistogram 
             lines,
             "disparity, px",
             "pixels, %",
-            "How near things are",
+            "Disparity",
         )
     ]
     for name, factor, x_label, title in (
-        ("occluded", 100, "pixels hidden from the other eye, %", "Occlusion"),
+        ("occluded", 100, "occluded pixels, %", "Occlusion"),
         ("visible_objects", 1, "objects in view", "Objects"),
         ("textured", 100, "textured pixels, %", "Texture"),
     ):
@@ -269,13 +275,13 @@ def histograms(statistics: dict[str, SetStatistics], wanted: DisparityHistogram 
 
 
 def _shares(values: NDArray[Any], edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Per cent of the values in each bin."""
+    """Percentage of the values in each bin."""
     heights: NDArray[np.float64] = 100 * np.histogram(values, edges)[0] / len(values)
     return heights
 
 
 def _keys(nearest_px: float) -> dict[str, Picture]:
-    """The colour codes: a bar of disparity from 0 to the nearest, and a disc of gradients."""
+    """The colour keys: a bar of disparities from 0 to the largest, and a disc of gradients."""
     bar = np.tile(np.linspace(0, nearest_px, 240), (12, 1))
     y, x = np.mgrid[-1:1:61j, -1:1:61j]
     disc = np.where((np.hypot(x, y) <= 1)[..., None], np.stack([x, y], axis=-1), np.nan)

@@ -1,1 +1,1 @@
-"""Exact labels from rays at the scene's own meshes, and what follows from a disparity map alone."""
+"""Exact ground truth from rays cast at the scene's meshes, and targets derived from disparity maps alone."""

@@ -1,7 +1,7 @@
 """Ground truth of a Scene by casting rays at its meshes: disparity, object index and occlusion, exact at pixel centres.
 
-Blender is not asked. The meshes it renders are the same, but the first sample of Cycles, which its depth pass keeps,
-is off the pixel's centre by some 5e-4 px, and its depth is in 32 bits: enough to miss leaves and wires.
+Blender renders the same meshes, but its depth pass would not be exact: it keeps the first sample of Cycles, which is
+off the pixel's centre by some 5e-4 px, and has 32 bits. That is enough to miss leaves and wires.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import Eye
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, SAME_SURFACE, VISIBLE
+from datagen.dataset.layout import View
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.ground_truth.labels import SAME_SURFACE
 from datagen.ground_truth.scene_geometry import SceneGeometry
 
 _FAR = 1e30
@@ -22,7 +23,7 @@ _FAR = 1e30
 
 @dataclass(frozen=True)
 class Hits:
-    """What the rays through some pixels' centres meet first."""
+    """What the rays through the centres of N pixels hit first."""
 
     disparity: NDArray[np.float64]
     """(N,) pixels; 0 where nothing is hit."""
@@ -34,18 +35,19 @@ class Hits:
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Which point of which triangle some pixels' centres show."""
+    """The points of triangles that the rays through the centres of N pixels hit first."""
 
     triangle: NDArray[np.int64]
     """(N,) row of `SceneGeometry.triangles`, -1 where nothing is hit."""
     weights: NDArray[np.float64]
-    """(N, 3) barycentric coordinates, exact where the ray meets the triangle's plane; 0 where nothing is."""
+    """(N, 3) barycentric coordinates of the ray's intersection with the triangle's plane; 0 where nothing is hit."""
 
 
 class SceneRayCaster:
-    """Casts rays from either eye at the triangles of a scene.
+    """Casts rays from either camera at the triangles of a scene.
 
-    Meshes are built once; they stand in the left eye's frame, where 32 bits lose least.
+    The triangles are kept in the left camera's frame, where 32-bit floats lose least. They are placed anew when another
+    instant is asked for.
     """
 
     def __init__(self, geometry: SceneGeometry) -> None:
@@ -53,50 +55,50 @@ class SceneRayCaster:
         self._scene = geometry.scene
         self._instant: float | None = None
 
-    def cast(self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Hits:
-        """First hits through the centres of the pixels (rows, columns), both (N,).
+    def cast(self, view: View, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Hits:
+        """The first hits of the rays through the centres of the pixels (rows, columns), both (N,).
 
-        Embree finds the triangle in 32 bits; the distance to its plane is then computed in 64 bits.
+        Embree finds the triangle with 32-bit floats. The distance to its plane is then computed with 64 bits.
         """
         directions = self.directions(rows, columns)
         disparity, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
         labels = np.full(len(directions), VISIBLE, np.uint8)
         if len(self.geometry.triangles):
             self._place(time_frames)
-            own, other = self._eyes(eye)
+            own, other = self._camera_centres(view)
             disparity, index = self._first_hits(own, directions)
-            x_other = columns + 0.5 + (-disparity if eye == "left" else disparity)
+            x_other = columns + 0.5 + (-disparity if view == "left" else disparity)
             inside = (x_other >= 0) & (x_other <= self._scene.camera.width)
             labels[~inside] = OUT_OF_FRAME
-            hidden = self._hidden(own, other, directions[inside], disparity[inside])
-            labels[inside] = np.where(hidden, OCCLUDED, VISIBLE)
+            occluded = self._is_occluded(own, other, directions[inside], disparity[inside])
+            labels[inside] = np.where(occluded, OCCLUDED, VISIBLE)
         return Hits(disparity, index, labels)
 
     def coarse_pixels(self, across: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rows and columns of a regular grid of about so many pixels a row, for a look at the whole image."""
+        """Rows and columns (N,) of a regular grid over the image, with about `across` pixels in a row."""
         camera = self._scene.camera
         step = max(1, camera.width // across)
         grid = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
         return grid[0].ravel(), grid[1].ravel()
 
-    def cast_all(self, eye: Eye, time_frames: float) -> Hits:
-        """First hits through the centres of all pixels, each field (H, W)."""
+    def cast_all(self, view: View, time_frames: float) -> Hits:
+        """The first hits of the rays through the centres of all pixels; each field is (H, W)."""
         shape = (self._scene.camera.height, self._scene.camera.width)
         rows, columns = np.indices(shape).reshape(2, -1)
-        hits = self.cast(eye, time_frames, rows, columns)
+        hits = self.cast(view, time_frames, rows, columns)
         return Hits(
             hits.disparity.reshape(shape), hits.object_index.reshape(shape), hits.occlusion.reshape(shape)
         )
 
     def surface_points(
-        self, eye: Eye, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
+        self, view: View, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
     ) -> SurfacePoints:
-        """What is seen through the centres of the pixels (rows, columns), both (N,)."""
+        """The surface points that the pixels (rows, columns), both (N,), show at their centres."""
         directions = self.directions(rows, columns)
         triangle, weights = np.full(len(directions), -1, np.int64), np.zeros((len(directions), 3))
         if len(self.geometry.triangles):
             self._place(time_frames)
-            own, _ = self._eyes(eye)
+            own, _ = self._camera_centres(view)
             triangle = self._nearest(own, directions)
             met = triangle >= 0
             a, b, c = np.moveaxis(self._vertices[self.geometry.triangles[triangle[met]]] - own, 1, 0)
@@ -106,10 +108,10 @@ class SceneRayCaster:
             weights[met] = np.stack(parts, -1) / np.sum(parts, axis=0)[:, None]
         return SurfacePoints(triangle, weights)
 
-    def sees_back(
+    def shows_back(
         self, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """(N,) whether the left eye's pixels show a triangle from the side its corners run clockwise on."""
+        """(N,) True where a pixel of the left view shows the back of a triangle, whose corners run clockwise there."""
         points, directions = (
             self.surface_points("left", time_frames, rows, columns),
             self.directions(rows, columns),
@@ -120,28 +122,28 @@ class SceneRayCaster:
         return back
 
     def directions(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
-        """(N, 3) through the pixels' centres, of unit length along the optical axis."""
+        """(N, 3) directions through the pixels' centres in the camera's frame, of length 1 along the optical axis."""
         camera = self._scene.camera
         x = (columns + 0.5 - camera.width / 2) / camera.focal_px
         y = -(rows + 0.5 - camera.height / 2) / camera.focal_px
         return np.stack([x, y, np.full_like(x, -1.0)], axis=-1)
 
-    def _eyes(self, eye: Eye) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where this eye and the other one are in the left eye's frame."""
+    def _camera_centres(self, view: View) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The centres of this view's camera and of the other one, in the left camera's frame."""
         left, right = np.zeros(3), np.array([self._scene.camera.baseline_m, 0.0, 0.0])
-        return (left, right) if eye == "left" else (right, left)
+        return (left, right) if view == "left" else (right, left)
 
     def _nearest(self, origin: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.int64]:
-        """(N,) the triangle each ray meets first, -1 for none."""
+        """(N,) the triangle that each ray hits first, -1 for none."""
         return self._run(origin, directions, "INTERSECT", np.full(len(directions), _FAR))
 
     def _first_hits(
         self, origin: NDArray[np.float64], directions: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """(N,) disparity and object index."""
+        """The disparity (N,) in px and the object index (N,) of the first hits."""
         hit = self._nearest(origin, directions)
         met = hit >= 0
-        # Far fewer triangles are seen than pixels; each tells once what it shows.
+        # Far fewer triangles are visible than there are pixels: compute the plane of each once.
         seen = np.zeros(len(self.geometry.triangles), bool)
         seen[hit[met]] = True
         place = (np.cumsum(seen) - 1)[hit[met]]
@@ -154,22 +156,24 @@ class SceneRayCaster:
     def _disparity_planes(
         self, triangles: NDArray[np.intp], origin: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(K, 3) p for each triangle such that a ray r of unit length along the axis sees it at disparity p.r."""
+        """(K, 3) a vector p for each triangle: a ray r of length 1 along the axis hits its plane at disparity p.r."""
         corners = self._vertices[self.geometry.triangles[triangles]] - origin
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # depth = n.v / n.r, and disparity = fB / depth.
         distance = np.einsum("ij,ij->i", normals, corners[:, 0])
         return self._scene.camera.disparity_metres * normals / distance[:, None]
 
-    def _hidden(
+    def _is_occluded(
         self,
         own: NDArray[np.float64],
         other: NDArray[np.float64],
         directions: NDArray[np.float64],
         disparity: NDArray[np.float64],
     ) -> NDArray[np.bool_]:
-        """Whether something stands between the other eye and what is seen; the sky is in the same direction
-        from both eyes."""
+        """(N,) True where something stands between the other camera and the point.
+
+        The sky is in the same direction from both cameras.
+        """
         sky = disparity == 0
         depth = self._scene.camera.disparity_metres / np.where(sky, 1.0, disparity)
         towards = directions * depth[:, None]
@@ -183,7 +187,7 @@ class SceneRayCaster:
         query: str,
         reach: NDArray[np.float64],
     ) -> NDArray[np.int64]:
-        """What Embree answers for rays from one point; `reach` is in lengths of their directions."""
+        """Embree's answer for rays from one point. `reach` is in lengths of their directions."""
         origins = np.broadcast_to(origin, directions.shape).astype(np.float32)
         answer = self._embree.run(
             origins, directions.astype(np.float32), dists=reach.astype(np.float32), query=query
@@ -191,11 +195,11 @@ class SceneRayCaster:
         return np.asarray(answer, np.int64)
 
     def _place(self, time_frames: float) -> None:
-        """Put all triangles where they are at an instant."""
+        """Place all triangles as they are at an instant."""
         if time_frames == self._instant:
             return
-        to_left_eye = np.linalg.inv(self._scene.camera.pose("left", time_frames))
-        self._vertices = self.geometry.vertices(time_frames, to_left_eye)
+        to_left_camera = np.linalg.inv(self._scene.camera.pose("left", time_frames))
+        self._vertices = self.geometry.vertices(time_frames, to_left_camera)
         self._embree = EmbreeScene(robust=True)
         TriangleMesh(self._embree, self._vertices.astype(np.float32), self.geometry.triangles)
         self._instant = time_frames

@@ -1,114 +1,140 @@
 """Targets that follow the surface a pixel shows: normals, optical flow, disparity change, motion boundaries.
 
-The point seen through a pixel's centre is a place on a triangle; where the triangle's vertices are at another
-instant, moved, turned and deformed, and seen by the camera of that instant, says exactly where the point has
-gone. Everything is 64-bit and independent of what Blender rendered.
+A pixel's centre shows a point of a triangle. At another instant the triangle's vertices have moved, turned and
+deformed, and so has the camera; where they are then gives the point's place exactly. Everything is computed with
+64-bit floats and independent of what Blender rendered.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import DIRECTIONS, Direction, Eye
+from datagen.dataset.layout import DIRECTIONS, Direction, View
 from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.scene_geometry import SceneGeometry
 from scenes import Scene
 
 STEP: dict[Direction, int] = {"into_future": 1, "into_past": -1}
-"""Frames from a pixel's instant to the one its point is followed to."""
+"""Frames from a pixel's instant to the one that its point is followed to."""
 BOUNDARY_STEP_PX = 1.5
 """Neighbouring pixels of two objects whose flows differ by at least this lie on a motion boundary."""
 BOUNDARY_PIXELS = 10
-"""A boundary of fewer connected pixels is none (both thresholds: Mayer et al. 2016, section 4)."""
+"""Fewer connected pixels than this are no boundary (both thresholds: Mayer et al., CVPR 2016, section 4)."""
 
 
+@dataclass(frozen=True, eq=False)
 class PixelSurfaces:
-    """What some pixels of one eye see at one instant, ready to be followed to other instants.
+    """The surface points that N pixels of one view show at one instant; made by `find_surfaces`.
 
-    The pixels are rows and columns of one shape S, which may be the whole image's or a list's; what the methods give
-    has that shape too.
+    The pixels form an array of shape S, the whole image's or a list's. What the methods return has that shape too.
     """
 
-    def __init__(
-        self,
-        caster: SceneRayCaster,
-        eye: Eye,
-        time_frames: float,
-        rows: NDArray[np.intp],
-        columns: NDArray[np.intp],
-    ) -> None:
-        self._geometry, self._eye, self._time = caster.geometry, eye, time_frames
-        self._shape = rows.shape
-        rows, columns = rows.ravel(), columns.ravel()
-        points = caster.surface_points(eye, time_frames, rows, columns)
-        self._met = points.triangle >= 0
-        self._corners = self._geometry.triangles[points.triangle[self._met]]
-        self._weights = points.weights[self._met]
-        self._centres = np.stack([columns, rows], -1) + 0.5
-        self._rays = caster.directions(rows, columns)
-        """Directions through the pixels' centres in the camera's frame (x right, y up, looking along -z)."""
+    geometry: SceneGeometry
+    view: View
+    time_frames: float
+    """The instant, in frames."""
+    shape: tuple[int, ...]
+    """S."""
+    is_hit: NDArray[np.bool_]
+    """(N,) False where a pixel shows the sky. M pixels show a surface."""
+    corners: NDArray[np.int32]
+    """(M, 3) the vertices of the triangle that is hit, as indices into `SceneGeometry.vertices`."""
+    weights: NDArray[np.float64]
+    """(M, 3) barycentric coordinates of the point in its triangle."""
+    centres: NDArray[np.float64]
+    """(N, 2) pixel centres [x, y] in pixels."""
+    rays: NDArray[np.float64]
+    """(N, 3) directions through the pixel centres in the camera's frame (x right, y up, looking along -z)."""
 
     def normals(self) -> NDArray[np.float32]:
-        """(*S, 3) unit normals of the triangles in the camera's frame, towards the eye; 0 for the sky."""
-        a, b, c = np.moveaxis(self._seen_from(self._time)[self._corners], 1, 0)
+        """(*S, 3) unit normals of the triangles in the camera's frame, towards the camera; 0 for the sky."""
+        a, b, c = np.moveaxis(self._seen_from(self.time_frames)[self.corners], 1, 0)
         normals = np.cross(b - a, c - a)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        away = np.einsum("ij,ij->i", normals, self._rays[self._met]) > 0
+        away = np.einsum("ij,ij->i", normals, self.rays[self.is_hit]) > 0
         normals[away] *= -1
-        return self._picture(normals, np.zeros((len(self._met), 3)))
+        return self._picture(normals, np.zeros((len(self.is_hit), 3)))
 
     def flow(self, direction: Direction) -> NDArray[np.float32]:
-        """(*S, 2) displacement [to the right, down] in px to where the point is seen one frame on.
+        """(*S, 2) optical flow [to the right, down] in px to the next or the previous frame.
 
-        NaN for points that will be behind the camera. The sky moves with the camera's rotation only.
+        It is NaN for points that are behind the camera then. The sky moves with the camera's rotation only.
         """
-        time = self._time + STEP[direction]
-        camera = self._geometry.scene.camera
-        turn = camera.pose(self._eye, time)[:3, :3].T @ camera.pose(self._eye, self._time)[:3, :3]
-        there = self._rays @ turn.T
-        there[self._met] = self._points_at(time)
+        time = self.time_frames + STEP[direction]
+        camera = self.geometry.scene.camera
+        turn = camera.pose(self.view, time)[:3, :3].T @ camera.pose(self.view, self.time_frames)[:3, :3]
+        there = self.rays @ turn.T
+        there[self.is_hit] = self._points_at(time)
         with np.errstate(divide="ignore", invalid="ignore"):
             x, y = (camera.focal_px * there[:, :2] / -there[:, 2:]).T
         seen = np.stack([camera.width / 2 + x, camera.height / 2 - y], -1)
         seen[there[:, 2] >= 0] = np.nan
-        return (seen - self._centres).reshape(*self._shape, 2).astype(np.float32)
+        return (seen - self.centres).reshape(*self.shape, 2).astype(np.float32)
 
     def disparity_change(self, direction: Direction) -> NDArray[np.float32]:
-        """(*S,) px by which the point's disparity grows until one frame on; NaN behind the camera, sky 0."""
-        fb = self._geometry.scene.camera.disparity_metres
-        now, then = (-self._points_at(time)[:, 2] for time in (self._time, self._time + STEP[direction]))
+        """(*S,) px by which the point's disparity grows until the next or the previous frame.
+
+        It is NaN for points that are behind the camera then, and 0 for the sky.
+        """
+        fb = self.geometry.scene.camera.disparity_metres
+        now, then = (
+            -self._points_at(time)[:, 2] for time in (self.time_frames, self.time_frames + STEP[direction])
+        )
         with np.errstate(divide="ignore"):
             change = np.where(then > 0, fb / then - fb / now, np.nan)
-        return self._picture(change, np.zeros(len(self._met)))
+        return self._picture(change, np.zeros(len(self.is_hit)))
 
     def _seen_from(self, time_frames: float) -> NDArray[np.float64]:
-        """(V, 3) all vertices at an instant in this eye's frame of that instant."""
-        camera = self._geometry.scene.camera
-        return self._geometry.vertices(time_frames, np.linalg.inv(camera.pose(self._eye, time_frames)))
+        """(V, 3) all vertices at an instant in this view's camera frame of that instant."""
+        camera = self.geometry.scene.camera
+        return self.geometry.vertices(time_frames, np.linalg.inv(camera.pose(self.view, time_frames)))
 
     def _points_at(self, time_frames: float) -> NDArray[np.float64]:
-        """(M, 3) where the surface points are at an instant, in this eye's frame of that instant."""
-        corners = self._seen_from(time_frames)[self._corners]
-        return np.einsum("ij,ijk->ik", self._weights, corners)
+        """(M, 3) where the surface points are at an instant, in this view's camera frame of that instant."""
+        corners = self._seen_from(time_frames)[self.corners]
+        return np.einsum("ij,ijk->ik", self.weights, corners)
 
     def _picture(self, values: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray[np.float32]:
         """An image of the values where something is hit, and of `sky` elsewhere."""
         picture = sky.copy()
-        picture[self._met] = values
-        return picture.reshape(*self._shape, *sky.shape[1:]).astype(np.float32)
+        picture[self.is_hit] = values
+        return picture.reshape(*self.shape, *sky.shape[1:]).astype(np.float32)
+
+
+def find_surfaces(
+    caster: SceneRayCaster, view: View, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
+) -> PixelSurfaces:
+    """Cast a ray through the centre of each pixel; rows and columns have one shape S."""
+    shape = rows.shape
+    rows, columns = rows.ravel(), columns.ravel()
+    points = caster.surface_points(view, time_frames, rows, columns)
+    is_hit = points.triangle >= 0
+    return PixelSurfaces(
+        geometry=caster.geometry,
+        view=view,
+        time_frames=time_frames,
+        shape=shape,
+        is_hit=is_hit,
+        corners=caster.geometry.triangles[points.triangle[is_hit]],
+        weights=points.weights[is_hit],
+        centres=np.stack([columns, rows], -1) + 0.5,
+        rays=caster.directions(rows, columns),
+    )
 
 
 def material_index(scene: Scene, object_index: NDArray[np.integer[Any]]) -> NDArray[np.uint16]:
-    """(H, W) 0 for the sky, else 1 + the index in `Scene.materials`, of what (H, W) objects wear."""
+    """(H, W) 0 for the sky, else 1 + the index in `Scene.materials` of the object that (H, W) object_index names."""
     worn = [0, *(1 + thing.material for thing in scene.objects)]
     return np.array(worn, np.uint16)[object_index]
 
 
 def object_edges(object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
-    """(H, W) where a pixel shows another object than one of its four neighbours."""
+    """(H, W) True where a pixel shows another object than one of its four neighbours."""
     marked = np.zeros(object_index.shape, bool)
     down, across = object_index[1:] != object_index[:-1], object_index[:, 1:] != object_index[:, :-1]
     marked[1:] |= down
@@ -119,9 +145,10 @@ def object_edges(object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
 
 
 def motion_boundaries(flow: NDArray[np.float32], object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
-    """(H, W) where two objects meet that move differently, by the (H, W, 2) flow of one direction.
+    """(H, W) True where two objects that move differently meet.
 
-    The flow matters at the objects' edges only (`object_edges`).
+    flow: (H, W, 2) px, of one direction; only its values at the objects' edges matter (`object_edges`).
+    object_index: (H, W).
     """
     marked = np.zeros(object_index.shape, bool)
     for axis in (0, 1):
@@ -137,23 +164,26 @@ def motion_boundaries(flow: NDArray[np.float32], object_index: NDArray[np.intege
 
 
 class ExtraTargets:
-    """Makes the targets a recipe asks for besides the basic ones."""
+    """Makes the targets that a recipe asks for besides the basic ones."""
 
     def __init__(self, caster: SceneRayCaster, kinds: tuple[str, ...]) -> None:
-        """kinds: among `datagen.dataset.layout.EXTRA_TARGETS`."""
+        """kinds: Names among `datagen.dataset.layout.EXTRA_TARGETS`."""
         self._caster, self._kinds = caster, kinds
 
     def make(
-        self, eye: Eye, frame: int, object_index: NDArray[np.integer[Any]]
+        self, view: View, frame: int, object_index: NDArray[np.integer[Any]]
     ) -> dict[tuple[str, Direction | None], NDArray[Any]]:
-        """The arrays of one eye and frame, by kind and direction. object_index: (H, W), the frame's."""
+        """The arrays of one view and frame, by kind and direction of time.
+
+        frame: The instant, from 0. object_index: (H, W) of that view and frame.
+        """
         made: dict[tuple[str, Direction | None], NDArray[Any]] = {}
         if "material_index" in self._kinds:
             made["material_index", None] = material_index(self._caster.geometry.scene, object_index)
         if set(self._kinds) <= {"material_index"}:
             return made
         pixels = np.indices(object_index.shape)
-        surfaces = PixelSurfaces(self._caster, eye, frame, pixels[0], pixels[1])
+        surfaces = find_surfaces(self._caster, view, frame, pixels[0], pixels[1])
         if "normals" in self._kinds:
             made["normals", None] = surfaces.normals()
         for direction in DIRECTIONS:

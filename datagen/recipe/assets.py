@@ -1,8 +1,8 @@
-"""Preparing the user's meshes, textures and environments: untrusted files in, clean arrays in a store out.
+"""Preparing user assets (meshes, textures, environments): untrusted files become clean arrays in a store.
 
-Every file is parsed in a process of its own with limited memory and time, since parsers of old formats can be
-made to loop, to crash or to ask for all memory there is. What is left is a plain array file named by the
-original's SHA-256 (`scenes.user_assets.pool`).
+Every file is parsed in a process of its own with limited memory and time, since a file can make parsers of old
+formats loop, crash or allocate all memory. The result is a plain array file named by the original's SHA-256
+(`scenes.user_assets.pool`).
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from datagen.executors import LocalExecutor, WorkerPolicy
 from datagen.formats.limits import check_image_size
 from scenes.geometry.building import solid
 from scenes.user_assets.pool import Asset, AssetPool
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.processes import Limits
 
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
@@ -33,28 +34,36 @@ ENVIRONMENT_SUFFIXES = (".hdr", ".exr")
 MAX_FILE_BYTES = 500 << 20
 MAX_TRIANGLES = 300_000
 MAX_SIDE_PX = 4096
+"""Larger images are made smaller."""
 MEAN_LUMINANCE = 0.5
-"""What environments are scaled to, so that they light a scene as the generator's own skies do."""
+"""Environments are scaled to this, so that they light a scene as the generator's own skies do."""
 MESH_LIMITS = Limits(timeout_s=60.0, memory_bytes=1 << 30)
 PICTURE_LIMITS = Limits(timeout_s=60.0, memory_bytes=4 << 30)
-"""An environment of 16384 x 8192 pixels is 1.6 GB before it is made smaller."""
+"""An environment of 16384 x 8192 pixels takes 1.6 GB before it is made smaller."""
 
 
 @dataclass(frozen=True)
 class ImportedAssets:
-    """What came of the user's folders."""
+    """The assets imported from the user's folders."""
 
     pool: AssetPool
     skipped: tuple[str, ...]
-    """One sentence for each file that was not usable."""
+    """One sentence for each file that is not usable."""
 
 
 def import_assets(
     store: Path, *, meshes: Path | None = None, textures: Path | None = None, environments: Path | None = None
 ) -> ImportedAssets:
-    """Prepare all usable files under the given folders into `store`.
+    """Prepare all usable files below the given folders into `store`.
 
-    Raises DatasetError for a folder that is missing or holds no usable file of its kind.
+    Args:
+        store: The folder for the prepared files; made if need be.
+        meshes: A folder of OBJ, PLY, GLB and STL files.
+        textures: A folder of PNG, JPEG, TIFF, WebP and BMP files.
+        environments: A folder of equirectangular Radiance HDR and OpenEXR files.
+
+    Raises:
+        DatasetError: For a folder that is missing or has no usable file of its kind.
     """
     store.mkdir(parents=True, exist_ok=True)
     skipped: list[str] = []
@@ -111,7 +120,7 @@ def _import_folder(
 
 
 def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> str | None:
-    """In the worker: prepare one file for the store, or say why not. Whatever a parser raises is its fault."""
+    """In the worker: prepare one file for the store, or say why not. Whatever a parser raises is the file's fault."""
     path, target = job
     try:
         arrays = prepare(path)
@@ -129,50 +138,59 @@ def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> str | None:
 
 
 def prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
-    """A mesh's `vertices`, `triangles` and `corner_uv`. Raises whatever the parser does."""
+    """A mesh's `vertices` (V, 3), `triangles` (T, 3) and `corner_uv` (3 T, 2).
+
+    Raises ValueError for a mesh of no use, and whatever the parser raises.
+    """
     options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     with path.open("rb") as file:  # From an open file no parser looks for others beside it.
         loaded = trimesh.load(file, file_type=path.suffix[1:].lower(), force="mesh", process=False, **options)
     vertices, triangles = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64)
     if len(triangles) < 4:
-        raise ValueError(f"it has {len(triangles)} triangles, too few for a thing")
+        raise InputError(f"it has {len(triangles)} triangles, too few for a thing")
     if len(triangles) > MAX_TRIANGLES:
-        raise ValueError(f"it has {len(triangles)} triangles, more than {MAX_TRIANGLES}")
+        raise InputError(f"it has {len(triangles)} triangles, more than {MAX_TRIANGLES}")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise ValueError("its triangles name vertices that are not there")
+        raise InputError("its triangles name vertices that are not there")
     triangles = triangles[np.isfinite(vertices).all(axis=1)[triangles].all(axis=1)]
     used, triangles = np.unique(triangles, return_inverse=True)
     vertices, triangles = vertices[used], triangles.reshape(-1, 3)
     if not len(triangles) or np.sort(np.ptp(vertices, axis=0))[1] == 0:
-        raise ValueError("it has no surface")
+        raise InputError("it has no surface")
     mesh = solid(vertices, triangles, smooth=True)
     if len(mesh.triangles) < 4:
-        raise ValueError("its triangles have no area")
+        raise InputError("its triangles have no area")
     return {"vertices": mesh.vertices, "triangles": mesh.triangles, "corner_uv": mesh.corner_uv}
 
 
 def prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
-    """A picture's `image`, uint8 RGB. Raises whatever the parser does."""
+    """A texture's `image`, (H, W, 3) uint8 sRGB.
+
+    Raises ValueError for a file of no use, and whatever the parser raises.
+    """
     image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR)
     if image is None:
-        raise ValueError("its pixels do not decode")
+        raise InputError("its pixels do not decode")
     return {"image": cv2.cvtColor(_bounded(image), cv2.COLOR_BGR2RGB)}
 
 
 def prepare_environment(path: Path) -> dict[str, NDArray[np.generic]]:
-    """An environment's `radiance`, float32 RGB. Raises whatever the parser does."""
+    """An environment's `radiance`, (H, W, 3) float32 linear RGB.
+
+    Raises ValueError for a file of no use, and whatever the parser raises.
+    """
     radiance = _read_exr(path) if path.suffix.lower() == ".exr" else _read_hdr(path)
     radiance = np.nan_to_num(np.maximum(_bounded(radiance), 0), posinf=0.0)
     luminance = float(radiance.mean())
     if luminance <= 0:
-        raise ValueError("it is black")
+        raise InputError("it is black")
     return {"radiance": (radiance * (MEAN_LUMINANCE / luminance)).astype(np.float32)}
 
 
 def _read_hdr(path: Path) -> NDArray[np.float32]:
     image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None or image.ndim != 3 or image.dtype != np.float32:
-        raise ValueError("it is no Radiance HDR picture")
+        raise InputError("it is no Radiance HDR picture")
     return np.ascontiguousarray(image[..., 2::-1])
 
 
@@ -186,10 +204,10 @@ def _read_exr(path: Path) -> NDArray[np.float32]:
 
 
 def _bounded(image: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Shrunk to at most `MAX_SIDE_PX`."""
+    """The image, made smaller if it is larger than `MAX_SIDE_PX`."""
     check_image_size(Path("it"), image.shape[1], image.shape[0], 3)
     longest = max(image.shape[:2])
     if longest <= MAX_SIDE_PX:
         return image
-    size = tuple(max(1, side * MAX_SIDE_PX // longest) for side in image.shape[1::-1])
+    size = tuple(max(1, length * MAX_SIDE_PX // longest) for length in image.shape[1::-1])
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))

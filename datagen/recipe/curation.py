@@ -1,7 +1,7 @@
-"""Which scenes are no use for training: found out before they are rendered, as far as rays can tell.
+"""Rejecting scenes that are of no use for training, by casting rays before anything is rendered.
 
-A rejected scene is drawn again from another random stream, that of its next attempt, so a data set with
-rejections is as reproducible as one without.
+A rejected scene is sampled again from another random stream, that of its next attempt. So a data set with rejections
+is as reproducible as one without.
 """
 
 from __future__ import annotations
@@ -15,35 +15,39 @@ from numpy.typing import NDArray
 
 from datagen.dataset.statistics import textured_share
 from datagen.errors import DatasetError
-from datagen.ground_truth.labels import VISIBLE
+from datagen.formats.occlusion import VISIBLE
 from datagen.ground_truth.raycast import SceneRayCaster
 
 TEXTURELESS = "textureless"
+"""Why `is_textureless` rejects a scene."""
 RAYS_ACROSS = 48
-"""Columns of the coarse grid of pixels that are looked at; rows in proportion."""
+"""Columns of the coarse grid of pixels through which rays are cast; rows in proportion."""
 
 
 @dataclass(frozen=True)
 class Curation:
-    """When a frame is degenerate. Shares are of the left eye's pixels, 0..1."""
+    """When a frame is degenerate. Shares are of the left view's pixels, 0 to 1.
+
+    Raises DatasetError for wrong values.
+    """
 
     enabled: bool = True
-    """Whether anything is rejected."""
+    """Whether scenes are rejected at all."""
     attempts: int = 20
-    """How often a scene is drawn before giving up."""
+    """How often a scene is sampled before it fails."""
     max_inside: float = 0.3
-    """Seeing the inner side of one object on more than this means that the camera is inside it."""
+    """Share that may show the back of one object; if it is more, the camera is inside the object."""
     max_one_object: float = 0.9
-    """One object, or the sky, filling more than this leaves nothing to learn."""
+    """Share that one object, or the sky, may fill."""
     max_hidden: float = 0.7
-    """Share that the other eye cannot see."""
+    """Share that may be invisible in the right view: occluded or out of frame."""
     min_textured: float = 0.05
-    """Share with texture around it, of the rendered picture."""
+    """Share of the rendered picture that must have texture."""
     disparity_px: tuple[float, float] | None = None
-    """Least and greatest disparity asked for of surfaces, met by choosing depths and baseline; None for whatever
+    """Least and greatest disparity that surfaces shall have, met by choosing depths and baseline; None for whatever
     the family gives."""
     max_outside: float = 0.02
-    """Share of surfaces whose disparity may be outside of that."""
+    """Share of the surfaces whose disparity may be outside that range."""
 
     def __post_init__(self) -> None:
         if self.attempts < 1:
@@ -58,7 +62,7 @@ class Curation:
 
 
 def fault_before_rendering(caster: SceneRayCaster, curation: Curation) -> str | None:
-    """What is wrong with the scene's first or last frame, in a word or two; None if nothing is."""
+    """What is wrong with the scene's first or last frame, in a few words; None if nothing is."""
     if not curation.enabled:
         return None
     # The first frame last: it is the one that the caster will be asked for next.
@@ -69,7 +73,10 @@ def fault_before_rendering(caster: SceneRayCaster, curation: Curation) -> str | 
 
 
 def share_outside(surfaces: NDArray[np.floating[Any]], curation: Curation) -> float:
-    """Share of the surfaces' disparities (P,) outside the range asked for; 0 without surfaces or without a range."""
+    """Share of the surfaces' disparities (P,) in px that are outside the range asked for.
+
+    It is 0 without surfaces or without a range.
+    """
     if not curation.disparity_px or not len(surfaces):
         return 0.0
     low, high = curation.disparity_px
@@ -77,7 +84,7 @@ def share_outside(surfaces: NDArray[np.floating[Any]], curation: Curation) -> fl
 
 
 def is_textureless(image: NDArray[np.uint8], curation: Curation) -> bool:
-    """Whether nearly all of a rendered (H, W, 3) picture has nothing to match."""
+    """Whether a rendered (H, W, 3) sRGB picture has too little texture to be matched."""
     return curation.enabled and textured_share(image) < curation.min_textured
 
 
@@ -86,13 +93,13 @@ def _faults(caster: SceneRayCaster, curation: Curation, frame: int) -> Iterator[
     rows, columns = caster.coarse_pixels(RAYS_ACROSS)
     hits = caster.cast("left", frame, rows, columns)
     counts = np.bincount(hits.object_index, minlength=len(scene.objects) + 1) / len(rows)
-    from_behind = caster.sees_back(frame, rows, columns)
+    from_behind = caster.shows_back(frame, rows, columns)
     inner = np.bincount(hits.object_index[from_behind], minlength=len(counts)) / len(rows)
     if inner.max() > curation.max_inside:
         yield "camera inside an object"
     if counts.max() > curation.max_one_object:
         yield "one surface fills the view"
     if (hits.occlusion != VISIBLE).mean() > curation.max_hidden:
-        yield "mostly hidden from the other eye"
+        yield "mostly occluded or out of frame"
     if share_outside(hits.disparity[hits.object_index > 0], curation) > curation.max_outside:
         yield "disparity out of range"

@@ -1,10 +1,10 @@
-"""Meeting a histogram of disparities: each scene's depths and baseline drawn such that the set as a whole has it.
+"""Meeting a histogram of disparities by choosing each scene's depths and baseline.
 
-What one scene shows is spread about its median in a way of its own, and the baseline puts that median wherever it is
-wanted without changing what the left eye sees. So a set's histogram is a mixture of the family's spread at different
-medians; families that place things by disparity have several spreads, narrow and wide. A few scenes that belong to no
-split show those spreads once, when the recipe is made; the shares of the mixture nearest to the histogram are written
-into the recipe, and every scene takes its turn by its number.
+The disparities of one scene are spread about their median in the family's way, and the baseline puts that median
+anywhere without changing the left view. So the histogram of a data set is a mixture of the family's spread at different
+medians. Families that place things by disparity have several spreads, narrow and wide. A few preflight scenes, of no
+split, show those spreads once; the mixture nearest to the histogram is written into the recipe, and the number of a
+scene decides which component of the mixture the scene belongs to.
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ from scipy.optimize import nnls
 from datagen.errors import DatasetError
 from datagen.recipe.disparity_range import surface_disparities
 from scenes import FAMILIES, FamilyConfig, sample_scene
+from stereoforge_kit.errors import InputError
 
-PILOT_KEY = 3
-"""First number of the pilot scenes' random streams, beside those of the three splits."""
-PILOT_SCENES = 16
-"""Of each spread."""
+PREFLIGHT_KEY = 3
+"""First number of the preflight scenes' random streams, beside those of the three splits."""
+PREFLIGHT_SCENES = 16
+"""Scenes sampled for each spread."""
 NARROW_RANGES = (4.0, 20.0)
-"""Ratios of greatest and least disparity that families which place things by disparity try besides their own."""
+"""Ratios of greatest to least disparity that families which place things by disparity try besides their own."""
 MEDIANS = 40
-"""Candidates, evenly spaced in the logarithm over three times the histogram's extent."""
+"""Number of candidate medians, evenly spaced in the logarithm over somewhat more than the histogram's extent."""
 NEGLIGIBLE = 1e-3
 """Components with less than this share are left out."""
 _GOLDEN = (np.sqrt(5) - 1) / 2
@@ -36,26 +37,29 @@ _GOLDEN = (np.sqrt(5) - 1) / 2
 
 @dataclass(frozen=True)
 class Component:
-    """Some of a set's scenes."""
+    """One component of the mixture: a share of the scenes, with the same median and spread."""
 
     share: float
-    """Of the scenes."""
+    """Share of the scenes, 0 to 1."""
     median_px: float
-    """Where the baseline puts the median of the surfaces' disparities."""
+    """The median of the surfaces' disparities, which the baseline is chosen for."""
     ratio: float | None = None
-    """Greatest over least disparity, for families that choose depths; None for the family's own."""
+    """Ratio of greatest to least disparity, for families that choose depths; None for the family's own."""
 
 
 @dataclass(frozen=True)
 class DisparityHistogram:
-    """How many pixels of surfaces shall have which disparity, over the left views of all scenes together."""
+    """How the disparities of surfaces shall be distributed over the left views of all scenes together.
+
+    Raises DatasetError for edges and shares that are no histogram.
+    """
 
     edges_px: tuple[float, ...]
-    """Bounds of the bins, increasing."""
+    """The edges of the bins in px, increasing."""
     shares: tuple[float, ...]
-    """Of each bin; they add up to 1."""
+    """The share of pixels in each bin; they add up to 1."""
     components: tuple[Component, ...] = ()
-    """What meets it, found by `fitted`."""
+    """The mixture that meets it, found by `fit_components`; empty until then."""
 
     def __post_init__(self) -> None:
         if len(self.edges_px) != len(self.shares) + 1 or not self.shares:
@@ -68,28 +72,34 @@ class DisparityHistogram:
             raise DatasetError(f"the shares of a disparity histogram must add up to 1, got {self.shares}")
 
     def component(self, scene: int) -> Component:
-        """That of the scene-th scene of a split: any run of scenes holds each about as often as its share says."""
+        """The component of a split's scene with this number.
+
+        Any run of scenes holds each component about as often as its share says. Raises ValueError if there are no
+        components yet.
+        """
+        if not self.components:
+            raise InputError("the disparity histogram has no components yet; fit_disparities finds them")
         turn = (scene + 0.5) * _GOLDEN % 1.0
         bounds = np.cumsum([component.share for component in self.components])
         return self.components[min(int(np.searchsorted(bounds, turn * bounds[-1])), len(bounds) - 1)]
 
     def missed(self, disparity: NDArray[np.floating[Any]]) -> float:
-        """Share of the surfaces' pixels (above 0) that would have to change bins to meet it."""
+        """Share of the surfaces' pixels, those above 0 px, that would have to change bins to meet the histogram."""
         surfaces = disparity[disparity > 0]
         found = np.histogram(surfaces, self.edges_px)[0] / max(len(surfaces), 1)
         return float(np.maximum(np.array(self.shares) - found, 0).sum())
 
 
 def with_depths(world: FamilyConfig, component: Component) -> FamilyConfig:
-    """The family's config with the spread of depths that a component asks for."""
+    """A family's config with the spread of depths that a component asks for."""
     return world if component.ratio is None else world.within_disparities(1.0, component.ratio)
 
 
-def fitted(wanted: DisparityHistogram, world: FamilyConfig, seed: int) -> DisparityHistogram:
-    """The histogram with the components that come nearest to it for a family's worlds.
+def fit_components(wanted: DisparityHistogram, world: FamilyConfig, seed: int) -> DisparityHistogram:
+    """The histogram with the mixture of components that comes nearest to it for a family's worlds.
 
-    Least squares between the cumulative distributions at the edges, over mixtures (non-negative shares that add up to
-    1). Samples and ray-casts some scenes: seconds.
+    The shares are non-negative and add up to 1; they minimise the squared differences between the cumulative
+    distributions at the edges. Some scenes are sampled and ray-cast, which takes seconds.
     """
     family = next(name for name, kind in FAMILIES.items() if type(world) is kind.config)
     ratios = (None, *NARROW_RANGES) if world.depths_for_range else (None,)
@@ -118,10 +128,13 @@ def fitted(wanted: DisparityHistogram, world: FamilyConfig, seed: int) -> Dispar
 
 
 def _spread(world: FamilyConfig, family: str, seed: int) -> NDArray[np.float64]:
-    """Disparities of the pilot scenes' surfaces over their scene's median, sorted, each scene counting alike."""
+    """(P,) sorted disparities of the preflight scenes' surfaces, each divided by its scene's median.
+
+    Every scene has the same weight.
+    """
     pooled = []
-    for number in range(PILOT_SCENES):
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PILOT_KEY, number)))
+    for number in range(PREFLIGHT_SCENES):
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PREFLIGHT_KEY, number)))
         disparity = surface_disparities(sample_scene(rng, family, world))
         if len(disparity):
             quantiles = np.quantile(disparity, np.linspace(0.0005, 0.9995, 1000))

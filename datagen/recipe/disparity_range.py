@@ -1,7 +1,8 @@
-"""Meeting disparities asked for where the depths of a world are what they are: by choosing the baseline.
+"""Choosing the baseline so that a scene has the disparities asked for.
 
-Streets and landscapes reach from the camera's feet to the horizon. What the left eye sees does not depend on the
-baseline, and every disparity is proportional to it, so one look decides it exactly.
+In streets and landscapes, which reach from the camera's feet to the horizon, the depths are given. But the left view
+does not depend on the baseline and every disparity is proportional to it, so the disparities with one baseline give
+those with any other.
 """
 
 from __future__ import annotations
@@ -12,27 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from scenes import Scene
 
 RAYS_ACROSS = 64
-"""Columns of the coarse grid of pixels that are looked at; rows in proportion."""
+"""Columns of the coarse grid of pixels through which rays are cast; rows in proportion."""
 REACHED_PERCENT = 99.5
-"""Percentile of the surfaces' disparities that is put at the greatest of a range."""
+"""Percentile of the surfaces' disparities that becomes the greatest disparity of a range."""
 
 
 def surface_disparities(scene: Scene) -> NDArray[np.float64]:
-    """(P,) px, of what a coarse grid of the left eye's pixels shows in the first and last frame, but the sky."""
-    caster = SceneRayCaster(SceneGeometry(scene))
+    """(P,) px, the disparities of surfaces at a coarse grid of the left view's pixels, in the first and last frame."""
+    caster = SceneRayCaster(build_geometry(scene))
     rows, columns = caster.coarse_pixels(RAYS_ACROSS)
-    seen = [caster.cast("left", frame, rows, columns) for frame in sorted({0, scene.frames - 1})]
-    return np.concatenate([hits.disparity[hits.object_index > 0] for hits in seen])
+    first_and_last = [caster.cast("left", frame, rows, columns) for frame in sorted({0, scene.frames - 1})]
+    return np.concatenate([hits.disparity[hits.object_index > 0] for hits in first_and_last])
 
 
 def with_disparity_at(scene: Scene, percent: float, disparity_px: float) -> Scene:
-    """The scene with the baseline at which a percentile of its surfaces' disparities is as given.
+    """The scene with the baseline at which a percentile of its surfaces' disparities has a given value in px.
 
-    Unchanged if it shows only sky.
+    The scene is unchanged if it shows only sky.
     """
     disparity = surface_disparities(scene)
     if not len(disparity):

@@ -1,4 +1,4 @@
-"""The recipe of a data set: all that decides its bytes, as a typed record and as `recipe.yaml`."""
+"""The recipe of a data set: everything that decides its bytes, as a typed record and as `recipe.yaml`."""
 
 from __future__ import annotations
 
@@ -17,42 +17,55 @@ from datagen.dataset.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
 from datagen.errors import DatasetError
 from datagen.formats.limits import MAX_ELEMENTS, read_bounded
 from datagen.recipe.curation import Curation
-from datagen.recipe.disparity_histogram import DisparityHistogram, fitted, with_depths
+from datagen.recipe.disparity_histogram import DisparityHistogram, fit_components, with_depths
 from datagen.recipe.disparity_range import REACHED_PERCENT, with_disparity_at
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
 from scenes.serialization import OMIT_DEFAULT, from_plain, to_plain
 from scenes.user_assets.pool import AssetPool
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_text
 
 MAX_RECIPE_BYTES = 1 << 20
+"""Largest recipe file that is read."""
 MAX_RECIPE_DEPTH = 32
+"""Deepest nesting that a recipe file may have."""
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What to render. Two runs of one recipe give the same bytes, however the work is spread."""
+    """What to render. Two runs of one recipe give the same bytes, however the work is spread.
+
+    Constructing a recipe checks its values and does nothing else. Raises DatasetError for values that no data
+    set can have.
+    """
 
     world: FamilyConfig
-    """The family's own config; the image size and the frames a scene are in it."""
+    """The family's config, which has the image size and the number of frames in a scene too."""
     scenes: dict[str, int]
     """How many scenes each split has."""
     seed: int = 0
+    """Everything random follows from it."""
     samples: int = 4
-    """Paths a pixel for the pictures; ground truth is exact whatever this is."""
+    """Paths per pixel for the pictures. Ground truth is exact whatever this is."""
     passes: tuple[str, ...] = ("clean",)
+    """Render passes, among "clean" and "final" (motion blur, defocus, fog, sensor noise)."""
     targets: tuple[str, ...] = ()
     """Targets besides disparity, gradient, occlusion and object index, which are always made."""
     gradient_threshold_px: float = 1.0
-    """Jumps above this are discontinuities, masked out of the gradient targets."""
+    """Larger forward differences are discontinuities and masked out of the gradient targets."""
 
     assets: AssetPool = field(default_factory=AssetPool)
-    """The user's own files; each belongs to one split only."""
+    """The user assets. Each belongs to one split only."""
     curriculum_scenes: int = 0
-    """Over so many scenes of the train split the worlds grow from few and simple to the family's own; 0 for none. What
-    is validated and tested on is the family's own from the first scene."""
+    """Over so many scenes the worlds of the train split grow from few and simple things to the family's own; 0 for no
+    such curriculum. Scenes of the other splits are the family's own from the first."""
     curation: Curation = field(default_factory=Curation)
+    """Which scenes are rejected and sampled again."""
     disparities: DisparityHistogram | None = field(default=None, metadata=OMIT_DEFAULT)
-    """How the disparities of all scenes together shall be spread; None for whatever the family gives."""
+    """The histogram of disparities that all scenes together shall have; None for whatever the family gives.
+
+    Its components are found by `fit_disparities`, which everything that samples scenes needs first.
+    """
 
     def __post_init__(self) -> None:
         for split, count in self.scenes.items():
@@ -79,7 +92,9 @@ class Recipe:
         if self.curriculum_scenes < 0:
             raise DatasetError(f"curriculum_scenes must not be negative, got {self.curriculum_scenes}")
         if self.assets and not FAMILIES[self.family].takes_assets:
-            raise DatasetError(f"worlds of {self.family} take no meshes, textures or environments of yours")
+            raise DatasetError(
+                f"worlds of {self.family} take no user assets (meshes, textures, environments)"
+            )
         try:
             self.world.at_complexity(0.0 if self.curriculum_scenes else 1.0)
             if self.curation.disparity_px:
@@ -88,13 +103,11 @@ class Recipe:
             raise DatasetError(str(error)) from error
         if self.disparities and self.curation.disparity_px:
             raise DatasetError("a recipe has a range of disparities or a histogram of them, not both")
-        if self.disparities and not self.disparities.components:
-            object.__setattr__(self, "disparities", fitted(self.disparities, self.world, self.seed))
         if self.seed < 0:
             raise DatasetError(f"the seed must not be negative, got {self.seed}")
 
     def _check_size(self) -> None:
-        """Raise DatasetError for images that no reader would take, and disparities that no eye would see."""
+        """Raise DatasetError for images that no reader would take, and disparities that no image could show."""
         width, height = self.world.width, self.world.height
         if 3 * width * height > MAX_ELEMENTS:
             raise DatasetError(
@@ -109,15 +122,19 @@ class Recipe:
 
     @property
     def family(self) -> str:
+        """The name of the family of worlds."""
         return next(name for name, family in FAMILIES.items() if type(self.world) is family.config)
 
     def settings_sha256(self) -> str:
-        """Identifies everything but the numbers of scenes, which may grow."""
+        """The SHA-256 of all settings but the numbers of scenes, which may grow."""
         settings = to_plain(replace(self, scenes={}))
         return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
     def sample(self, split: str, index: int, attempt: int = 0) -> Scene:
-        """The index-th scene of a split; splits, scenes and attempts draw from unrelated random streams."""
+        """Sample the index-th scene of a split. Splits, scenes and attempts draw from unrelated random streams.
+
+        Raises ValueError if the recipe's disparity histogram has no components yet (`fit_disparities`).
+        """
         key = (SPLITS.index(split), index) + ((attempt,) if attempt else ())
         sequence = np.random.SeedSequence(self.seed, spawn_key=key)
         world = self.world
@@ -133,6 +150,17 @@ class Recipe:
         return with_disparity_at(scene, 50.0, component.median_px) if component else scene
 
 
+def fit_disparities(recipe: Recipe) -> Recipe:
+    """The recipe with the components of its disparity histogram, ready to sample scenes.
+
+    Unchanged if the recipe asks for no histogram or already has the components. Otherwise some scenes are
+    sampled and ray-cast, which takes seconds.
+    """
+    if recipe.disparities is None or recipe.disparities.components:
+        return recipe
+    return replace(recipe, disparities=fit_components(recipe.disparities, recipe.world, recipe.seed))
+
+
 def _check_names(what: str, names: tuple[str, ...], known: Collection[str]) -> None:
     for name in names:
         if name not in known:
@@ -142,7 +170,7 @@ def _check_names(what: str, names: tuple[str, ...], known: Collection[str]) -> N
 
 
 def recipe_from_plain(data: Any, origin: str) -> Recipe:
-    """Raises DatasetError naming `origin` for anything that is not a recipe."""
+    """A recipe from parsed YAML. Raises DatasetError, naming `origin`, for anything that is not a recipe."""
     if not isinstance(data, dict):
         raise DatasetError(f"{origin} is not a valid recipe: it has no settings, such as world: and scenes:")
     try:
@@ -152,7 +180,7 @@ def recipe_from_plain(data: Any, origin: str) -> Recipe:
 
 
 def recipe_from_text(text: bytes, origin: str) -> Recipe:
-    """Raises DatasetError naming `origin` for bytes that are no YAML, or no recipe."""
+    """A recipe from YAML text in UTF-8. Raises DatasetError, naming `origin`, for text that is no YAML or no recipe."""
     if len(text) > MAX_RECIPE_BYTES:
         raise DatasetError(f"cannot read the recipe {origin}: {len(text)} bytes are more than any recipe has")
     try:
@@ -164,43 +192,45 @@ def recipe_from_text(text: bytes, origin: str) -> Recipe:
 
 
 def _reason(error: Exception) -> str:
-    """What is wrong with a text, and in which line, without the parser's account of what it was about to do."""
+    """What is wrong with a YAML text, and in which line, without the parser's account of what it was doing."""
     if isinstance(error, yaml.MarkedYAMLError) and error.problem and error.problem_mark:
         return f"line {error.problem_mark.line + 1}: {error.problem}"
     return " ".join(str(error).split())
 
 
 def _check_shape(text: str) -> None:
-    """Raise ValueError for nesting and repetition by reference that no recipe has and that could grow without end."""
+    """Raise ValueError for deep nesting and for references, which no recipe has and which could grow without end."""
     depth = 0
     for event in yaml.parse(text, yaml.SafeLoader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if isinstance(event, yaml.AliasEvent) or depth > MAX_RECIPE_DEPTH:
-            raise ValueError("it refers to another place in it or is nested too deeply")
+            raise InputError("it refers to another place in it or is nested too deeply")
 
 
 def read_recipe(path: Path) -> Recipe:
-    """Raises DatasetError for a file that is missing, no YAML, or no recipe."""
+    """Read a recipe file. Raises DatasetError for a file that is missing, no YAML or no recipe."""
     if not path.exists():
         raise DatasetError(f"there is no recipe {path}")
     return recipe_from_text(read_bounded(path, MAX_RECIPE_BYTES), str(path))
 
 
 def recipe_to_text(recipe: Recipe) -> str:
+    """A recipe as YAML text, which `recipe_from_text` reads."""
     return yaml.safe_dump(to_plain(recipe), sort_keys=False)
 
 
 def write_recipe(path: Path, recipe: Recipe) -> None:
+    """Write a recipe file, which `read_recipe` reads."""
     write_text(path, recipe_to_text(recipe))
 
 
 def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
-    """The recipe of a folder that already has one: scenes may be added, nothing else may change.
+    """The recipe of a folder that already has one, with the scenes that another recipe adds.
 
-    Raises DatasetError naming the first setting that differs.
+    Nothing else may change. Raises DatasetError, naming `folder` and the first setting that differs.
     """
     before, after = (_flat(to_plain(replace(recipe, scenes={}))) for recipe in (existing, wanted))
-    # Another family has other settings altogether; that it is another one is what to say.
+    # Another family has other settings altogether: name the family first.
     for key in sorted(set(before) | set(after), key=lambda key: (key != "world.family", key)):
         if before.get(key) != after.get(key):
             raise DatasetError(

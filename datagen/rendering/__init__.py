@@ -1,1 +1,1 @@
-"""From a recipe to scenes on disk: frames, passes, staging, quarantine, resumption."""
+"""From a recipe to scenes on disk: frames and passes, staging, quarantine, resuming."""

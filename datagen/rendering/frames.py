@@ -1,4 +1,4 @@
-"""A Scene to arrays: both eyes' pictures and exact ground truth, frame by frame."""
+"""From a Scene to arrays: both views' pictures and exact ground truth, frame by frame."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import EYES, Direction, Eye
+from datagen.dataset.layout import VIEWS, Direction, View
 from datagen.ground_truth.labels import forward_differences, gradient_validity
 from datagen.ground_truth.raycast import Hits, SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.ground_truth.targets import ExtraTargets
 from datagen.rendering.exposure import automatic_exposure, develop
 from datagen.rendering.sensor import Sensor
@@ -28,35 +28,37 @@ LOG_LINES_SHOWN = 5
 
 
 @dataclass(frozen=True)
-class EyeTargets:
-    """One eye's pictures and ground truth, as they are stored."""
+class ViewTargets:
+    """The pictures and the ground truth of one view of one frame, as they are stored."""
 
     images: dict[str, NDArray[np.uint8]]
-    """(H, W, 3) sRGB of each pass, by its name."""
+    """(H, W, 3) sRGB of each render pass, by its name."""
     disparity: NDArray[np.float32]
     """(H, W) px."""
     gradient: NDArray[np.float32]
     """(H, W, 2) forward differences [dx, dy] of the disparity."""
     gradient_valid: NDArray[np.bool_]
-    """(H, W)."""
+    """(H, W) True where the gradient exists and is no discontinuity."""
     occlusion: NDArray[np.uint8]
     """(H, W) 0 visible, 1 occluded, 2 out of the other frame."""
     object_index: NDArray[np.uint16]
     """(H, W) 0 where nothing is hit, else 1 + the index in `Scene.objects`."""
     extra: dict[tuple[str, Direction | None], NDArray[Any]]
-    """The targets asked for besides, by kind and direction."""
+    """The targets asked for besides, by kind and direction of time."""
 
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """How a Scene becomes arrays."""
+    """How a Scene is turned into arrays."""
 
     samples: int = 4
-    """Paths a pixel; ground truth is exact whatever this is."""
+    """Paths per pixel. Ground truth is exact whatever this is."""
     device: str = "cpu"
+    """What Cycles computes on: cpu, cuda, optix, hip or metal."""
     threads: int = 1
+    """CPU threads that Blender may use."""
     gradient_threshold_px: float = 1.0
-    """Larger forward differences are discontinuities: invalid as gradient targets."""
+    """Larger forward differences are discontinuities and invalid as gradient targets."""
     targets: tuple[str, ...] = ()
     """Which of `EXTRA_TARGETS` to make."""
     passes: tuple[str, ...] = ("clean",)
@@ -65,12 +67,13 @@ class RenderOptions:
 
 @dataclass
 class Stopwatch:
-    """Wall seconds by step."""
+    """Measures the wall time of steps, in seconds by the step's name."""
 
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
     def step(self, name: str) -> Iterator[None]:
+        """Add the time spent in the `with` block to the step's."""
         start = time.perf_counter()
         try:
             yield
@@ -79,7 +82,7 @@ class Stopwatch:
 
 
 class BlenderError(UserError):
-    """Blender could not render a scene; the message carries the end of its log."""
+    """Blender could not render a scene. The message ends with the end of its log."""
 
 
 def render_frames(
@@ -88,12 +91,21 @@ def render_frames(
     options: RenderOptions | None = None,
     watch: Stopwatch | None = None,
     caster: SceneRayCaster | None = None,
-) -> Generator[tuple[int, dict[Eye, EyeTargets]], None, None]:
-    """Yield (frame, both eyes' arrays) for every frame of a scene, frames counted from 0.
+) -> Generator[tuple[int, dict[View, ViewTargets]], None, None]:
+    """Render a scene; yield (frame, both views' arrays) for every frame, frames counted from 0.
 
-    scratch: an existing folder for Blender's temporary files and, outside worker processes, its log.
-    caster: at the scene's meshes, if they have been built already. Blender keeps one world a process, so one
-    iterator at a time. Raises BlenderError, and RuntimeError on a Python without bpy.
+    Blender keeps one world in a process, so use one of these iterators at a time.
+
+    Args:
+        scene: The world and its camera.
+        scratch: An existing folder for Blender's temporary files and, outside worker processes, its log.
+        options: Samples, device, passes and targets.
+        watch: Where the time of each step is added up.
+        caster: A ray caster of this scene, if there is one already.
+
+    Raises:
+        BlenderError: If Blender fails.
+        ImportError: On a Python without bpy.
     """
     # Imported here so that planning, verifying and training work on a Python without Blender.
     from datagen.blender.build import build_world
@@ -106,33 +118,33 @@ def render_frames(
     exposure: float | None = None
     try:
         with watch.step("build"), quiet(log):
-            caster = caster or SceneRayCaster(SceneGeometry(scene))
+            caster = caster or SceneRayCaster(build_geometry(scene))
             settings = CyclesSettings(options.samples, options.device, options.threads)
             world = build_world(caster.geometry, start_empty_file(settings))
         sensor = Sensor(scene)
         extra_targets = ExtraTargets(caster, options.targets)
         for frame in range(scene.frames):
             with watch.step("render"), quiet(log):
-                views = {eye: render_view(world, eye, frame, scratch) for eye in EYES}
-            if exposure is None:  # One exposure a scene: a camera does not flicker.
-                exposure = automatic_exposure(views["left"], scene.exposure_key)
-            images = {eye: {"clean": develop(radiance, exposure)} for eye, radiance in views.items()}
+                radiances = {view: render_view(world, view, frame, scratch) for view in VIEWS}
+            if exposure is None:  # One exposure for a scene: a camera does not flicker.
+                exposure = automatic_exposure(radiances["left"], scene.exposure_key)
+            images = {view: {"clean": develop(radiance, exposure)} for view, radiance in radiances.items()}
             if "final" in options.passes:
                 with watch.step("render_final"), quiet(log):
-                    for eye, radiance in render_final(world, frame, exposure, scratch).items():
-                        light = sensor.expose(radiance, exposure, eye, frame)
-                        images[eye]["final"] = develop(light, 1.0)
+                    for view, radiance in render_final(world, frame, exposure, scratch).items():
+                        light = sensor.expose(radiance, exposure, view, frame)
+                        images[view]["final"] = develop(light, 1.0)
             with watch.step("ground_truth"):
                 targets = {}
-                for eye in EYES:
-                    hits = caster.cast_all(eye, frame)
-                    chosen = {name: images[eye][name] for name in options.passes}
-                    extra = extra_targets.make(eye, frame, hits.object_index)
-                    targets[eye] = _targets(chosen, hits, options.gradient_threshold_px, extra)
+                for view in VIEWS:
+                    hits = caster.cast_all(view, frame)
+                    chosen = {name: images[view][name] for name in options.passes}
+                    extra = extra_targets.make(view, frame, hits.object_index)
+                    targets[view] = _targets(chosen, hits, options.gradient_threshold_px, extra)
             yield frame, targets
     except RuntimeError as error:
         tail = " | ".join(log.read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:])
-        raise BlenderError(f"{error}; Blender's last words: {tail}" if tail else str(error)) from error
+        raise BlenderError(f"{error}; the end of Blender's log: {tail}" if tail else str(error)) from error
 
 
 def _targets(
@@ -140,10 +152,10 @@ def _targets(
     hits: Hits,
     gradient_threshold_px: float,
     extra: dict[tuple[str, Direction | None], NDArray[Any]],
-) -> EyeTargets:
+) -> ViewTargets:
     disparity = hits.disparity.astype(np.float32)
     gradient = forward_differences(disparity)
-    return EyeTargets(
+    return ViewTargets(
         images,
         disparity,
         gradient,

@@ -1,4 +1,4 @@
-"""Looking before rendering: can what a recipe asks for be had at all, on this machine and of this family?"""
+"""Preflight checks: whether this machine has the device, and the family the disparities, that a run needs."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from scenes.user_assets.pool import AssetPool
 from stereoforge_kit.processes import WorkerError, call_limited
 
 DEVICE_TIMEOUT_S = 300.0
-"""A driver that is met for the first time may compile for a while."""
+"""On its first use a driver may compile for a while."""
 
 
 def check_device(device: str) -> None:
-    """Raise DatasetError unless Cycles finds such a device on this machine, asked in a process of its own: drivers
-    crash."""
+    """Raise DatasetError unless Cycles finds such a device on this machine.
+
+    Cycles is asked in a process of its own, since drivers crash.
+    """
     if device == "cpu":
         return
     try:
@@ -33,9 +35,9 @@ def check_device(device: str) -> None:
 
 
 def check_disparity_range(recipe: Recipe) -> None:
-    """Raise DatasetError if no scene of as many as would be drawn for one keeps within the recipe's disparities.
+    """Raise DatasetError if a scene with the recipe's range of disparities is not found in as many attempts as one has.
 
-    Samples and ray-casts scenes until one does: seconds.
+    Scenes are sampled and ray-cast until one is found, which takes seconds.
     """
     curation = recipe.curation
     if not curation.enabled or not curation.disparity_px:

@@ -1,9 +1,9 @@
-"""Scenes that could not be rendered, kept with all it takes to find out why.
+"""The quarantine: scenes that could not be rendered, with what it takes to find out why.
 
     quarantine/TRAIN/A/0003.json    which scene, its record, the reason
     quarantine/TRAIN/A/0003.log     what Blender and the worker process printed
 
-It is no part of the data. A scene leaves it when it has been rendered after all.
+The quarantine is no part of the data. A scene leaves it when a later run renders the scene.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from datagen.dataset.layout import SPLITS, Layout
+from datagen.dataset.layout import SPLITS, Layout, SceneKey
 from datagen.errors import DatasetError
 from datagen.executors import Failure
 from datagen.recipe.recipe import Recipe
 from scenes import scene_to_json
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import Tree
 from stereoforge_kit.processes import WorkerError, call_limited
 
@@ -32,24 +33,27 @@ class QuarantinedScene:
     split: str
     scene: int
     kind: str
-    """`crash`, `killed`, `timeout`, `memory` or `exception`."""
+    """How the scene failed: `crash`, `killed`, `timeout`, `memory` or `exception`."""
     reason: str
     """One sentence."""
     attempts: int
     recipe_sha256: str
     record: dict[str, Any] | None
-    """The Scene record; None if sampling the scene is what fails."""
+    """The Scene record; None if the scene could not be sampled."""
 
     @property
     def name(self) -> str:
+        """Split and number, for example `train/0003`."""
         return f"{self.split}/{self.scene:04d}"
 
 
 def put_in_quarantine(
     tree: Tree, scratch: Path, recipe: Recipe, split: str, scene: int, failure: Failure, attempts: int
 ) -> QuarantinedScene:
-    """Write down that, and why, a scene could not be rendered; by way of a scratch folder, so that a run killed
-    meanwhile leaves no half of a file."""
+    """Record that a scene could not be rendered, and why.
+
+    The files are written to `scratch` first, so that a killed run leaves no half of a file.
+    """
     entry = QuarantinedScene(
         split=split,
         scene=scene,
@@ -68,13 +72,13 @@ def put_in_quarantine(
 
 
 def release(tree: Tree, split: str, scene: int) -> None:
-    """Take a scene out of quarantine, if it is in it."""
+    """Take a scene out of the quarantine if it is there."""
     tree.remove(_entry_name(split, scene))
     tree.remove(log_name(split, scene))
 
 
-def quarantined_scenes(tree: Tree) -> list[tuple[str, int]]:
-    """(split, scene) of every scene in quarantine, in order."""
+def quarantined_scenes(tree: Tree) -> list[SceneKey]:
+    """(split, number) of every scene in quarantine, in order."""
     found = []
     for split in SPLITS:
         names = tree.files_in(_entry_name(split, 0).rpartition("/")[0])
@@ -83,18 +87,19 @@ def quarantined_scenes(tree: Tree) -> list[tuple[str, int]]:
 
 
 def read_quarantined(tree: Tree, split: str, scene: int) -> QuarantinedScene:
-    """Raises DatasetError for an entry that is missing or damaged."""
+    """Read the entry of a scene in quarantine. Raises DatasetError for an entry that is missing or damaged."""
     name = _entry_name(split, scene)
     try:
         entry = QuarantinedScene(**json.loads(tree.read(name)))
         if (entry.split, entry.scene) != (split, scene):
-            raise ValueError("it is another scene's")
+            raise InputError("it is another scene's")
         return entry
     except (OSError, ValueError, TypeError, RecursionError) as error:
         raise DatasetError(f"{tree.name}/{name}: is not an entry of the quarantine ({error})") from error
 
 
 def log_name(split: str, scene: int) -> str:
+    """The path of a scene's log below the data set's root."""
     return _entry_name(split, scene).removesuffix(".json") + ".log"
 
 
@@ -103,7 +108,7 @@ def _entry_name(split: str, scene: int) -> str:
 
 
 def _sample_safely(recipe: Recipe, split: str, scene: int) -> dict[str, Any] | None:
-    """The Scene record, sampled where a fault in sampling does no harm."""
+    """The Scene record, sampled in a process of its own, where a crash does no harm; None if that fails."""
     try:
         record: dict[str, Any] = call_limited(
             _sample_record,

@@ -1,4 +1,4 @@
-"""Rendering a data set: which scenes are missing, workers to make them, and what came of it."""
+"""Rendering a data set: finding the missing scenes, giving them to workers and taking in the outcomes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from datagen.dataset.layout import SPLITS, Layout, scene_numbers
+from datagen.dataset.layout import SPLITS, Layout, SceneKey, scene_numbers
 from datagen.dataset.manifest import SceneManifest
 from datagen.errors import DatasetError, DiskFullError
 from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
 from datagen.executors.devices import assign_devices, find_gpus
-from datagen.recipe.recipe import Recipe, merge_into, recipe_from_text, write_recipe
+from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_from_text, write_recipe
 from datagen.rendering.preflight import check_device, check_disparity_range
 from datagen.rendering.quarantine import (
     QuarantinedScene,
@@ -30,13 +30,11 @@ from stereoforge_kit.files import LocalTree, Tree, open_tree
 from stereoforge_kit.processes import Limits, available_memory_bytes
 
 SCENE_TIMEOUT_S = 1800.0
+"""How long one scene may take by default."""
 MEMORY_SHARE = 0.8
-"""Of the machine's memory, for all workers together."""
+"""Share of the machine's memory that all workers together may use."""
 NO_ROOM_BYTES = 16 << 20
-"""A failure with less room than this is the disk's: Blender does not say so itself."""
-
-Scene = tuple[str, int]
-"""(split, number)."""
+"""With less room than this a failure is put down to the full disk: Blender does not say so itself."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +44,11 @@ class RenderSummary:
     recipe: Recipe
     """The folder's recipe after the run."""
     rendered: int
+    """Scenes that this run rendered."""
     already_there: int
+    """Scenes asked for that were finished before."""
     failures: tuple[QuarantinedScene, ...]
-    """Every scene asked for that is in quarantine now, from this run or an earlier one."""
+    """The scenes asked for that are in quarantine now, from this run or an earlier one."""
 
 
 def render_dataset(
@@ -59,27 +59,34 @@ def render_dataset(
     device: str = "cpu",
     shard: tuple[int, int] = (0, 1),
     executor: Executor | None = None,
-    only: Collection[Scene] | None = None,
+    only: Collection[SceneKey] | None = None,
     on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
 ) -> RenderSummary:
-    """Render what is missing of a recipe under `root`; running it again finishes or extends the data set.
+    """Render the missing scenes of a recipe under `root`. Running it again finishes or extends the data set.
 
-    A scene that crashes, hangs, exceeds its memory or raises an error goes to quarantine with its record and
-    log, the others go on; later runs leave it alone unless it is named in `only`.
+    A scene that crashes, hangs, exceeds its memory or raises an error goes to quarantine with its record and log,
+    and the others go on. Later runs leave it alone unless it is named in `only`.
 
-    root: a folder, or a URL that fsspec knows, such as s3://bucket/folder. workers: processes, default one a
-    core or one a GPU. shard: (i, n) renders only every n-th scene from the i-th, so that n machines can share
-    a folder. only: render these (split, number) if they are missing, and nothing else. on_scene: called with
-    (done, total, manifest or None if it failed).
+    Args:
+        recipe: What to render. Its disparity histogram is fitted first if need be (`fit_disparities`).
+        root: A folder, or a URL that fsspec knows, such as s3://bucket/folder.
+        workers: Worker processes; None for one per core or one per GPU.
+        device: What Cycles computes on: cpu, cuda, optix, hip or metal.
+        shard: (i, n) renders only every n-th scene from the i-th, so that n machines can share a folder.
+        executor: Where scenes are rendered; None for worker processes on this machine.
+        only: Render these (split, number) if they are missing, and nothing else.
+        on_scene: Called after each scene with (scenes done, scenes in all, the manifest or None if it failed).
 
-    Raises DatasetError if the folder holds something else: other files, or a data set of other settings; before
-    anything is written if this machine has no such device, or scenes cannot have the disparities asked for; and
-    DiskFullError, with the data set as whole as it is, when there is no room for more.
+    Raises:
+        DatasetError: If the folder has other files or a data set of other settings, if this machine has no such
+            device, or if scenes cannot have the disparities asked for. Nothing has been written then.
+        DiskFullError: If there is no room for more. The finished scenes are whole.
     """
     tree = open_tree(root)
     if isinstance(tree, LocalTree) and tree.root.exists() and not tree.root.is_dir():
         raise DatasetError(f"{tree.name} is a file, not a folder; give a new or empty folder")
     wanted = list(_wanted(recipe, shard))
+    recipe = fit_disparities(recipe)
     merged = _merge(tree, recipe)
     if wanted:
         _check_store(tree, recipe)
@@ -106,9 +113,13 @@ def local_executor(
     timeout_s: float = SCENE_TIMEOUT_S,
     memory_bytes: int | None = None,
 ) -> LocalExecutor:
-    """Worker processes of this machine: one a core or one a GPU, which together fit into its memory.
+    """Worker processes on this machine that together fit into its memory.
 
-    timeout_s, memory_bytes: what one scene may use, and the memory by default its worker's share.
+    Args:
+        workers: How many; None for one per core or one per GPU.
+        device: What Cycles computes on.
+        timeout_s: How long one scene may take.
+        memory_bytes: How much memory one scene may use; None for its worker's share.
     """
     cores = len(os.sched_getaffinity(0))
     gpus = find_gpus(device, os.environ)
@@ -124,9 +135,14 @@ def ray_executor(
     timeout_s: float = SCENE_TIMEOUT_S,
     memory_bytes: int | None = None,
 ) -> RayExecutor:
-    """Workers of a Ray cluster: one a CPU, or one a GPU.
+    """Workers of a Ray cluster: one per CPU, or one per GPU.
 
-    memory_bytes: what one scene may use; no limit by default, since the machines of a cluster differ.
+    Args:
+        address: The cluster's address; None for a cluster of this machine alone.
+        workers: At most so many; None for all that the cluster has room for.
+        device: What Cycles computes on.
+        timeout_s: How long one scene may take.
+        memory_bytes: How much memory one scene may use; None for no limit, since the machines of a cluster differ.
     """
     policy = WorkerPolicy(Limits(timeout_s, memory_bytes))
     return RayExecutor(address, workers, gpus_per_job=0.0 if device == "cpu" else 1.0, policy=policy)
@@ -134,18 +150,18 @@ def ray_executor(
 
 @dataclass
 class _Run:
-    """The outcomes of a run as they come: counted, logged, quarantined."""
+    """Takes in the outcomes of a run as they come: counts, logs and quarantines them."""
 
     tree: Tree
     area: StagingArea
     recipe: Recipe
     log: RunLog
-    quarantined: set[Scene]
+    quarantined: set[SceneKey]
     total: int
     on_scene: Callable[[int, int, SceneManifest | None], None] | None
     rendered: int = 0
     bytes_written: int = 0
-    in_flight: set[Scene] = field(default_factory=set)
+    in_flight: set[SceneKey] = field(default_factory=set)
 
     def go(self, executor: Executor, jobs: list[SceneJob]) -> None:
         settings = self.recipe.settings_sha256()
@@ -191,7 +207,7 @@ class _Run:
         put_in_quarantine(self.tree, self.area.folder, self.recipe, *scene, failure, outcome.attempts)
         self.quarantined.add(scene)
 
-    def _take_scene(self, scene: Scene, manifest: SceneManifest, attempts: int) -> None:
+    def _take_scene(self, scene: SceneKey, manifest: SceneManifest, attempts: int) -> None:
         size = sum(entry.size for entry in manifest.files)
         self.rendered += 1
         self.bytes_written += size
@@ -214,9 +230,9 @@ class _Run:
 
 
 def _check_possible(
-    recipe: Recipe, device: str, executor: Executor, tree: Tree, wanted: Sequence[tuple[str, int]]
+    recipe: Recipe, device: str, executor: Executor, tree: Tree, wanted: Sequence[SceneKey]
 ) -> None:
-    """Raise DatasetError for what no scene would be rendered with, instead of putting all of them in quarantine."""
+    """Raise DatasetError for what would make every scene fail, instead of putting all of them in quarantine."""
     asks = device != "cpu" or recipe.curation.disparity_px is not None
     if not asks or not set(wanted) - committed_scenes(tree):  # to list a large store takes a while
         return
@@ -226,7 +242,7 @@ def _check_possible(
 
 
 def _merge(tree: Tree, recipe: Recipe) -> Recipe:
-    """The recipe of a new place, or the one that is there with what `recipe` adds. Changes nothing."""
+    """The recipe that the folder will have: the one that is there, if any, with the scenes that `recipe` adds."""
     name = Layout(Path()).recipe.name
     if tree.exists(name):
         existing = recipe_from_text(tree.read(name), f"{tree.name}/{name}")
@@ -237,38 +253,38 @@ def _merge(tree: Tree, recipe: Recipe) -> Recipe:
 
 
 def _check_store(tree: Tree, recipe: Recipe) -> None:
-    """Raise DatasetError unless the user's files that a recipe names are in the data set's own store."""
+    """Raise DatasetError unless the user assets that a recipe names are in the data set's store."""
     pool = recipe.assets
     if not pool:
         return
     if not isinstance(tree, LocalTree):
-        raise DatasetError(f"{tree.name}: a recipe with files of your own needs a folder, not a URL")
+        raise DatasetError(f"{tree.name}: a recipe with user assets needs a folder, not a URL")
     store = Layout(tree.root).assets
     for asset in (*pool.meshes, *pool.textures, *pool.environments):
         if not (store / f"{asset.sha256}.npz").is_file():
             raise DatasetError(
                 f"{tree.name} has no prepared file of {asset.name}, which the recipe names: give the folders of "
-                "your own files again"
+                "your meshes, textures and environments again"
             )
 
 
 def _write_recipe(tree: Tree, area: StagingArea, recipe: Recipe) -> None:
-    """By way of the staging area, so that a run killed meanwhile leaves no temporary file."""
+    """Write the recipe by way of the staging area, so that a killed run leaves no temporary file."""
     staged = Layout(area.folder).recipe
     write_recipe(staged, recipe)
     if not tree.exists(staged.name) or tree.read(staged.name) != staged.read_bytes():
         tree.adopt(staged, staged.name)
 
 
-def committed_scenes(tree: Tree) -> set[Scene]:
-    """Every scene that is whole."""
+def committed_scenes(tree: Tree) -> set[SceneKey]:
+    """(split, number) of every finished scene."""
     folders = {split: Layout(Path()).manifest(split, 0).parent.as_posix() for split in SPLITS}
     return {
         (split, scene) for split, folder in folders.items() for scene in scene_numbers(tree.files_in(folder))
     }
 
 
-def _wanted(recipe: Recipe, shard: tuple[int, int]) -> Iterator[Scene]:
+def _wanted(recipe: Recipe, shard: tuple[int, int]) -> Iterator[SceneKey]:
     index, count = shard
     if not 0 <= index < count:
         raise DatasetError(f"shard {index}/{count} does not exist: it takes 0 <= I < N")

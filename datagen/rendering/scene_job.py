@@ -1,4 +1,4 @@
-"""One scene from recipe to committed files: what a worker process does."""
+"""The job of a worker process: one scene, from the recipe to committed files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from datagen.dataset.layout import FIRST_FRAME, RENDER_PASSES, Direction, Eye, Layout
+from datagen.dataset.layout import FIRST_FRAME, RENDER_PASSES, Direction, Layout, View
 from datagen.dataset.manifest import SceneManifest, file_entry, write_manifest
 from datagen.errors import DatasetError
 from datagen.formats import (
@@ -25,12 +25,12 @@ from datagen.formats import (
     write_pfm,
     write_png,
 )
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.curation import TEXTURELESS, fault_before_rendering, is_textureless
 from datagen.recipe.recipe import Recipe
-from datagen.rendering.frames import BLENDER_LOG, EyeTargets, RenderOptions, Stopwatch, render_frames
+from datagen.rendering.frames import BLENDER_LOG, RenderOptions, Stopwatch, ViewTargets, render_frames
 from datagen.rendering.staging import StagingArea
 from scenes import Scene, scene_to_json
 from scenes.user_assets.pool import UserEnvironment, UserMesh, UserTexture, use_store
@@ -39,12 +39,12 @@ from stereoforge_kit.files import LocalTree, Tree, write_text
 
 @dataclass(frozen=True)
 class SceneJob:
-    """One scene to render, and with what."""
+    """One scene to render, and what it needs."""
 
     tree: Tree
-    """Where the data set is."""
+    """The folder or URL of the data set."""
     area: StagingArea
-    """Where the scene is made."""
+    """Where the scene is staged before it is committed."""
     recipe: Recipe
     split: str
     scene: int
@@ -53,14 +53,15 @@ class SceneJob:
 
     @property
     def name(self) -> str:
+        """Split and number, for example `train/0003`."""
         return f"{self.split}/{self.scene:04d}"
 
 
 def render_scene(job: SceneJob) -> SceneManifest:
-    """Render, measure and commit one scene.
+    """Render, measure and commit one scene; return its manifest.
 
-    Everything is written to a staging folder first and moved into place at the end, the manifest last, so
-    that a scene with a manifest is whole whatever happens.
+    Everything is written to a staging folder first and moved into place at the end, the manifest last. So a scene
+    with a manifest is whole, whatever happens. Raises DatasetError if every attempt at the scene is degenerate.
     """
     with job.area.scene_folder(job.split, job.scene) as staging:
         watch = Stopwatch()
@@ -69,14 +70,14 @@ def render_scene(job: SceneJob) -> SceneManifest:
 
 
 def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, Any]:
-    """Stage the first attempt at the scene that is not degenerate, all files but its manifest; its statistics."""
+    """Stage all files but the manifest of the first attempt that is not degenerate; return its statistics."""
     if isinstance(job.tree, LocalTree):
         use_store(Layout(job.tree.root).assets)
     rejected: Counter[str] = Counter()
     for attempt in range(job.recipe.curation.attempts):
         with watch.step("sample"):
             scene = job.recipe.sample(job.split, job.scene, attempt)
-            caster = SceneRayCaster(SceneGeometry(scene))
+            caster = SceneRayCaster(build_geometry(scene))
         with watch.step("ground_truth"):  # The tree of triangles built here serves the first frame too.
             fault = fault_before_rendering(caster, job.recipe.curation)
         frames = None if fault else _render_attempt(job, staging, caster, watch)
@@ -93,7 +94,7 @@ def _render_staged(job: SceneJob, staging: Path, watch: Stopwatch) -> dict[str, 
 def _render_attempt(
     job: SceneJob, staging: Path, caster: SceneRayCaster, watch: Stopwatch
 ) -> list[dict[str, float]] | None:
-    """Render and stage a scene; its frames' statistics, or None if its first picture is textureless."""
+    """Render and stage a scene; return its frames' statistics, or None if the first picture is textureless."""
     recipe, staged, scene = job.recipe, Layout(staging), caster.geometry.scene
     options = RenderOptions(
         recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets, recipe.passes
@@ -104,8 +105,8 @@ def _render_attempt(
             if frame == 0 and is_textureless(next(iter(targets["left"].images.values())), recipe.curation):
                 return None
             with watch.step("write"):
-                for eye, arrays in targets.items():
-                    _write_eye(staged, job, eye, FIRST_FRAME + frame, arrays)
+                for view, arrays in targets.items():
+                    _write_view(staged, job, view, FIRST_FRAME + frame, arrays)
                 statistics.append(_frame_statistics(targets["left"]))
     with watch.step("write"):
         _write_scene_files(staged, job, scene)
@@ -122,9 +123,9 @@ _EXTRA_WRITERS: dict[str, Callable[[Path, Any], None]] = {
 }
 
 
-def _write_eye(layout: Layout, job: SceneJob, eye: Eye, number: int, arrays: EyeTargets) -> None:
+def _write_view(layout: Layout, job: SceneJob, view: View, number: int, arrays: ViewTargets) -> None:
     def path(kind: str, direction: Direction | None = None) -> Path:
-        return layout.file(kind, job.split, job.scene, eye, number, direction)
+        return layout.file(kind, job.split, job.scene, view, number, direction)
 
     for name, image in arrays.images.items():
         write_png(path(RENDER_PASSES[name]), image)
@@ -145,7 +146,7 @@ def _write_scene_files(layout: Layout, job: SceneJob, scene: Scene) -> None:
     write_text(layout.scene_record(job.split, job.scene), scene_to_json(scene))
 
 
-def _frame_statistics(left: EyeTargets) -> dict[str, float]:
+def _frame_statistics(left: ViewTargets) -> dict[str, float]:
     low, middle, high = np.percentile(left.disparity, (1, 50, 99))
     return {
         "disparity_p01_px": float(low),
@@ -160,25 +161,25 @@ def _frame_statistics(left: EyeTargets) -> dict[str, float]:
 
 
 def _scene_statistics(scene: Scene, frames: list[dict[str, float]], rejected: Counter[str]) -> dict[str, Any]:
-    """Counts, the means over the frames of what was measured in the left eye, and what was rejected why."""
+    """Counts, means over the frames of what was measured in the left view, and the reasons of rejections."""
     means = {key: round(float(np.mean([frame[key] for frame in frames])), 5) for key in frames[0]}
     return {"objects": len(scene.objects), "frames": scene.frames, **means, "rejected": dict(rejected)}
 
 
 def _assets_used(recipe: Recipe, scene: Scene) -> list[str]:
-    """The names of the user's own files in a scene."""
-    own = (
+    """The names of the user assets in a scene."""
+    candidates = (
         *(thing.shape for thing in scene.objects),
         *(material.color for material in scene.materials),
         scene.world.environment,
     )
-    used = {item.sha256 for item in own if isinstance(item, UserMesh | UserTexture | UserEnvironment)}
+    used = {item.sha256 for item in candidates if isinstance(item, UserMesh | UserTexture | UserEnvironment)}
     pool = recipe.assets
     return sorted(a.name for a in (*pool.meshes, *pool.textures, *pool.environments) if a.sha256 in used)
 
 
 def _commit(job: SceneJob, staging: Path, watch: Stopwatch, statistics: dict[str, Any]) -> SceneManifest:
-    """Move the staged scene into the data set and make it exist by putting its manifest there."""
+    """Move the staged scene into the data set, its manifest last."""
     files = sorted(path for path in staging.rglob("*") if path.is_file())
     manifest = _manifest(job, staging, files, watch, statistics)
     staged_manifest = Layout(staging).manifest(job.split, job.scene)
@@ -214,6 +215,6 @@ def _manifest(
 
 
 def _unit(path: Path, root: Path) -> Path:
-    """What is moved as a whole for a staged file: a scene's folder, or the scene's single record."""
+    """What is moved as a whole with a staged file: the folder that it is in, or the scene's single record."""
     kind, split, group, scene, *_ = path.relative_to(root).parts
     return root / kind / split / group / scene

@@ -1,4 +1,4 @@
-"""What the camera itself adds to a final picture: vignetting, unequal eyes, photon noise. Pure numpy."""
+"""The sensor of the final pass: vignetting, unequal exposure and colour of the two cameras, photon noise."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import EYES, Eye
+from datagen.dataset.layout import VIEWS, View
 from scenes import Scene, scene_to_json
 from scenes.spec import FinalPass
 
 
 class Sensor:
-    """The two eyes' sensors of a scene; noise follows from the Scene record, the frame and the eye."""
+    """The sensors of a scene's two cameras. The noise is seeded by the Scene record, the frame and the view."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._final = scene, scene.final
@@ -25,15 +25,22 @@ class Sensor:
         return int.from_bytes(digest[:8], "big")
 
     def expose(
-        self, radiance: NDArray[np.float32], exposure: float, eye: Eye, frame: int
+        self, radiance: NDArray[np.float32], exposure: float, view: View, frame: int
     ) -> NDArray[np.float32]:
-        """(H, W, 3) light on the sensor, 1 is full white, of linear radiance and the scene's exposure."""
+        """(H, W, 3) float32 light on the sensor, 1 being white.
+
+        Args:
+            radiance: (H, W, 3) linear RGB.
+            exposure: The scene's factor from radiance to light.
+            view: "left" or "right".
+            frame: The frame's number from 0, which seeds the noise.
+        """
         light = radiance * np.float32(exposure) * vignette(self._final, *radiance.shape[:2])[..., None]
-        if eye == "right":
+        if view == "right":
             light = light * np.float32(2.0**self._final.exposure_difference_ev)
-            light = light * np.array(self._final.right_eye_color, np.float32)
+            light = light * np.array(self._final.right_view_color, np.float32)
         if self._final.noise > 0:
-            rng = np.random.default_rng((self._seed, frame, EYES.index(eye)))
+            rng = np.random.default_rng((self._seed, frame, VIEWS.index(view)))
             # Photons arrive independently: the deviation of their number grows with the root of it.
             deviation = self._final.noise * np.sqrt(np.clip(light, 0.0, 1.0))
             light = light + deviation * rng.standard_normal(light.shape, np.float32)
@@ -41,7 +48,7 @@ class Sensor:
 
 
 def vignette(final: FinalPass, height: int, width: int) -> NDArray[np.float32]:
-    """(H, W) share of the light that is left: falls with the square of the distance from the centre."""
+    """(H, W) float32 share of the light that vignetting leaves; it falls with the squared distance from the centre."""
     x = (np.arange(width) + 0.5) / width * 2 - 1
     y = ((np.arange(height) + 0.5) / height * 2 - 1)[:, None]
     aspect = height / width

@@ -1,10 +1,10 @@
-"""Where scenes are made before they are committed, so that whatever is killed leaves nothing behind.
+"""Staging: scenes are made apart and then committed, so that a killed run leaves nothing behind.
 
-In a folder, every run works in one of its own, `.staging/<run>`, and holds a lock on it for as long as it lives.
-One whose lock is free belongs to a run that is gone: the next one clears it away, and with it what its
-unfinished scenes had already moved into the data set. Behind a URL scenes are made in the temporary files of the
-machine that renders them, in folders that are locked in the same way; what was uploaded of an unfinished scene is
-replaced when the scene is rendered again.
+In a data set's folder every run has a staging area of its own, `.staging/<run>`, and keeps it locked while it lives. An
+area whose lock is free belongs to a run that is gone. The next run removes it, and also what its unfinished scenes had
+already moved into the data set. Behind a URL scenes are staged in the temporary files of the machine that renders
+them, in folders locked in the same way. What was uploaded of an unfinished scene is replaced when the scene is
+rendered again.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from datagen.dataset.layout import SPLITS, Layout
+from datagen.dataset.layout import SPLITS, Layout, SceneKey
 from stereoforge_kit.files import (
     LocalTree,
     TemporaryFolders,
@@ -28,22 +28,22 @@ from stereoforge_kit.files import (
 )
 
 STAGING_FOLDER = ".staging"
+"""The data set's folder of staging areas."""
 COMMITS = "commits"
-"""Locked by all who commit scenes of an area, and by who clears it alone."""
+"""Name of the lock that every commit of an area shares, and that clearing the area takes alone."""
 
 
 @dataclass(frozen=True)
 class StagingArea:
-    """A run's own folder, which is gone with it."""
+    """The folder of one run, removed at its end."""
 
     folder: Path
     within_tree: bool
-    """Whether it lies in the data set's folder, where all machines that render can reach it."""
+    """Whether it is in the data set's folder, where all machines that render can reach it."""
 
     @contextmanager
     def scene_folder(self, split: str, scene: int) -> Iterator[Path]:
-        """A new, empty folder for one attempt at a scene, and a place beside it for this process's temporary
-        files meanwhile."""
+        """A new, empty folder for one attempt at a scene. This process's temporary files are beside it meanwhile."""
         with self._attempt(split, scene) as attempt:
             staged, temporary = attempt / "scene", attempt / "temporary"
             staged.mkdir()
@@ -65,9 +65,9 @@ class StagingArea:
 
     @contextmanager
     def committing(self, split: str, scene: int) -> Iterator[None]:
-        """Keep two attempts at one scene, of which one was given up too early, from mixing their files.
+        """Commit a scene alone: two attempts at it, one given up too early, must not mix their files.
 
-        Behind a URL nothing keeps them apart; attempts on machines of one kind upload the same bytes.
+        Behind a URL nothing keeps them apart, but attempts on machines of one kind upload the same bytes.
         """
         if not self.within_tree:
             yield
@@ -78,7 +78,7 @@ class StagingArea:
 
 @contextmanager
 def staging_area(tree: Tree) -> Iterator[StagingArea]:
-    """A new staging area for a run into `tree`, cleared away at the end, with those of runs that are gone."""
+    """A new staging area for a run into `tree`. At the end it is removed, and so are those of runs that are gone."""
     if not isinstance(tree, LocalTree):
         with temporary_folder() as folder:
             yield StagingArea(folder, within_tree=False)
@@ -89,9 +89,9 @@ def staging_area(tree: Tree) -> Iterator[StagingArea]:
 
 
 def _clear(tree: Tree, area: Path) -> None:
-    """Remove an area, and from the data set whatever its unfinished scenes had put there already.
+    """Remove a staging area, and what its unfinished scenes had already moved into the data set.
 
-    A scene that another machine is committing meanwhile is waited for, and none is committed any more.
+    A commit that another machine is making is waited for; no other begins.
     """
     with (
         suppress(FileNotFoundError),
@@ -102,8 +102,8 @@ def _clear(tree: Tree, area: Path) -> None:
         remove_folder(area)
 
 
-def _unfinished_scenes(area: Path) -> set[tuple[str, int]]:
-    """(split, scene) of every scene that was being made in an area."""
+def _unfinished_scenes(area: Path) -> set[SceneKey]:
+    """(split, number) of every scene that was being made in an area."""
     found = set()
     for path in area.iterdir():
         split, _, rest = path.name.partition("-")

@@ -1,5 +1,6 @@
-"""Readers of data sets, one module a kind, found by themselves: a module has a tuple `FORMATS` of `SourceFormat`.
+"""Readers of data sets, one module for each kind.
 
-What their encodings share in memory: disparity positive for both views, in pixels of the image, NaN where there is
-none. Each module says what its files mean and what is derived.
+A module with a tuple `FORMATS` of `SourceFormat` is found without being registered. In memory all sets look alike: the
+disparity is positive for both views, in pixels of the image, and NaN where there is none. Each module says what its
+files mean and what is derived from them.
 """

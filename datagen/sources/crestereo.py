@@ -1,8 +1,8 @@
 """CREStereo's synthetic set (Li et al., CVPR 2022): `{tree,shapenet,reflective,hole}/*_left.jpg`, `*_right.jpg`,
 `*_left.disp.png`, `*_right.disp.png`.
 
-Disparities of both views as 16-bit PNG, d = value / 32, every pixel valid. Occlusion is derived from both.
-Every frame is a scene of its own; the four folders are kinds of scenes.
+The disparities of both views are 16-bit PNG files with d = value / 32, valid everywhere. Occlusion is derived from
+both. Every frame is a scene of its own; the four folders are kinds of scenes.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 UNITS_PER_PX = 32
+"""Of the 16-bit PNG files."""
 _LEFT = "_left.disp.png"
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a CREStereo disparity. Raises FormatError."""
+    """Read a CREStereo disparity: (H, W) float32 px. Raises FormatError for a file that is none."""
     values = read_png(path)
     if values.dtype != np.uint16 or values.ndim != 2:
         raise FormatError(f"{path}: a CREStereo disparity is a 16-bit grey PNG, not {values.dtype}")

@@ -1,8 +1,8 @@
 """ETH3D two-view stereo (Schöps et al., CVPR 2017): `two_view_training/<scene>/im0.png, im1.png` and
-`two_view_training_gt/<scene>/disp0GT.pfm, mask0nocc.png`, the truth also found beside the images.
+`two_view_training_gt/<scene>/disp0GT.pfm, mask0nocc.png`. The ground truth may be beside the images too.
 
-Encoded as Middlebury's: infinite where there is none, the mask 255 where both views show the point. Pairs of one place
-(`delivery_area_1l`, `delivery_area_3s`) are of one scene.
+The encoding is Middlebury's: the disparity is infinite where there is none, and the mask is 255 where both views show
+the point. Pairs of one place (`delivery_area_1l`, `delivery_area_3s`) are of one scene.
 """
 
 from __future__ import annotations

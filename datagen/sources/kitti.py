@@ -1,8 +1,8 @@
-"""KITTI 2012 and 2015 (Geiger et al., CVPR 2012; Menze and Geiger, CVPR 2015): the training part, sparse truth.
+"""KITTI 2012 and 2015 (Geiger et al., CVPR 2012; Menze and Geiger, CVPR 2015): sparse ground truth.
 
-Disparity of the left view as 16-bit PNG, d = value / 256, 0 where there is none. `occ` holds all points, `noc` those
-the right view shows. The truth that 2015 calls `disp_occ_1` is the left view's one frame later, not the right
-view's, so there is no right disparity here.
+The frames with ground truth are those of the training part. The disparity of the left view is a 16-bit PNG file with
+d = value / 256, 0 where there is none. `occ` has all points, `noc` those that are visible in the right view. What 2015
+calls `disp_occ_1` is the left view's disparity one frame later, not the right view's, so there is no right disparity.
 """
 
 from __future__ import annotations
@@ -20,17 +20,19 @@ from datagen.formats import read_png
 from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.picture import read_picture
 from datagen.ground_truth.from_disparity import occlusion_from_mask
-from datagen.sources.registry import SourceFormat
+from datagen.sources.registry import DataSource, SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 UNITS_PER_PX = 256
+"""Of the 16-bit PNG files; 0 stands for no disparity."""
 FRAME_LIST = "frames.txt"
-"""In sets that were exported to this layout: a line a frame, its name here and there (`datagen.export.kitti`)."""
+"""In sets that were exported to this layout: a line for each frame with its names here and in the set it comes from
+(`datagen.export.kitti`)."""
 
 
 @dataclass(frozen=True)
 class _Edition:
-    """The folders of one edition."""
+    """The folders of one edition; `objects` is None if it has no object maps."""
 
     left: str
     right: str
@@ -39,16 +41,23 @@ class _Edition:
     objects: str | None = None
 
 
-_KITTI_2012 = (
-    _Edition("colored_0", "colored_1", "disp_occ", "disp_noc"),
-    _Edition("image_0", "image_1", "disp_occ", "disp_noc"),
-)
-"""With the colour images, or with the grey ones only."""
-_KITTI_2015 = (_Edition("image_2", "image_3", "disp_occ_0", "disp_noc_0", "obj_map"),)
+_EDITIONS = {
+    "kitti2012": (
+        _Edition("colored_0", "colored_1", "disp_occ", "disp_noc"),
+        _Edition("image_0", "image_1", "disp_occ", "disp_noc"),
+    ),
+    "kitti2015": (_Edition("image_2", "image_3", "disp_occ_0", "disp_noc_0", "obj_map"),),
+}
+"""By the name of the format. KITTI 2012 comes with colour images, or with the grey ones only."""
+_REFERENCE_FRAMES = "*_10.png"
+"""Of the frames 00 to 20 of a sequence, number 10 has ground truth and is the one that the server judges."""
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a KITTI disparity, NaN where there is none. Raises FormatError."""
+    """Read a KITTI disparity: (H, W) float32 px, NaN where there is none.
+
+    Raises FormatError for a file that is none.
+    """
     values = read_png(path)
     if values.dtype != np.uint16 or values.ndim != 2:
         raise FormatError(
@@ -60,14 +69,17 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
 
 
 def read_labels(all_points: Path, visible_points: Path) -> NDArray[np.uint8]:
-    """Points missing from the second file are hidden in the right view. Raises FormatError."""
+    """(H, W) occlusion labels: points that only the first file has are not visible in the right view.
+
+    Raises FormatError.
+    """
     disparity = read_disparity(all_points)
-    hidden = np.isnan(read_disparity(visible_points)) & ~np.isnan(disparity)
-    return occlusion_from_mask(disparity, hidden)
+    not_visible = np.isnan(read_disparity(visible_points)) & ~np.isnan(disparity)
+    return occlusion_from_mask(disparity, not_visible)
 
 
 def read_foreground(path: Path) -> NDArray[np.uint16]:
-    """0 background, else a number a car. Raises FormatError."""
+    """Read an object map: (H, W) uint16, 0 background, else the number of a car. Raises FormatError."""
     return read_png(path).astype(np.uint16)
 
 
@@ -87,8 +99,10 @@ def _find(root: str, split: str, editions: tuple[_Edition, ...]) -> Sequence[Ste
 
 
 def _scenes(frame_list: Path) -> dict[str, str]:
-    """The scenes of exported frames by the frames' names; empty for KITTI itself, where every frame is one of its own.
-    Raises FormatError."""
+    """The scenes of exported frames by the frames' names.
+
+    Empty for KITTI itself, where every frame is a scene of its own. Raises FormatError.
+    """
     if not frame_list.is_file():
         return {}
     lines = read_bounded(frame_list, MAX_JSON_BYTES).decode("utf-8", errors="replace").splitlines()
@@ -98,7 +112,7 @@ def _scenes(frame_list: Path) -> dict[str, str]:
 
 def _frames(folder: Path, edition: _Edition) -> Iterator[FileFrame]:
     scenes = _scenes(folder / FRAME_LIST)
-    for truth in sorted((folder / edition.all_points).glob("*_10.png")):
+    for truth in sorted((folder / edition.all_points).glob(_REFERENCE_FRAMES)):
         visible = folder / edition.visible_points / truth.name
         objects = None if edition.objects is None else folder / edition.objects / truth.name
         yield FileFrame(
@@ -112,15 +126,40 @@ def _frames(folder: Path, edition: _Edition) -> Iterator[FileFrame]:
         )
 
 
+def testing_frames(source: DataSource) -> Sequence[StereoFrame]:
+    """The frames of a KITTI source's testing part, empty where it is not there.
+
+    Only KITTI's server has their ground truth, so their disparity is NaN everywhere.
+    """
+    folder = Path(source.location) / "testing"
+    for edition in _EDITIONS[source.format.name]:
+        if (folder / edition.left).is_dir():
+            images = sorted((folder / edition.left).glob(_REFERENCE_FRAMES))
+            return FileFrames(_testing_frame(left, folder / edition.right / left.name) for left in images)
+    return []
+
+
+def _testing_frame(left: Path, right: Path) -> FileFrame:
+    return FileFrame(
+        name=left.stem,
+        scene_name=left.stem,
+        read_left=partial(read_picture, left),
+        read_right=partial(read_picture, right),
+        read_disparity_left=partial(_unknown_disparity, left),
+    )
+
+
+def _unknown_disparity(image: Path) -> NDArray[np.float32]:
+    """(H, W) NaN, of the size of an image."""
+    return np.full(read_picture(image).shape[:2], np.nan, np.float32)
+
+
 FORMATS = tuple(
     SourceFormat(
         name,
         title,
-        partial(lambda root, editions: _edition(root, editions) is not None, editions=editions),
-        partial(_find, editions=editions),
+        partial(lambda root, editions: _edition(root, editions) is not None, editions=_EDITIONS[name]),
+        partial(_find, editions=_EDITIONS[name]),
     )
-    for name, title, editions in (
-        ("kitti2012", "KITTI 2012", _KITTI_2012),
-        ("kitti2015", "KITTI 2015", _KITTI_2015),
-    )
+    for name, title in (("kitti2012", "KITTI 2012"), ("kitti2015", "KITTI 2015"))
 )

@@ -1,8 +1,8 @@
-"""Middlebury with floating-point truth: the 2014 and 2021 scenes and the version 3 benchmark (Scharstein et al.,
-GCPR 2014). A folder a scene: `im0.png`, `im1.png`, `disp0.pfm` (benchmark: `disp0GT.pfm`), often also `disp1` and
-`mask0nocc.png`.
+"""Middlebury with floating-point disparities: the 2014 and 2021 scenes and the version 3 benchmark (Scharstein et al.,
+GCPR 2014). Every scene has a folder with `im0.png`, `im1.png` and `disp0.pfm` (benchmark: `disp0GT.pfm`), often also
+`disp1` and `mask0nocc.png`.
 
-Disparities are pixels, infinity where there is none. The mask is 255 where both views show the point; without it
+Disparities are in pixels, infinite where there is none. The mask is 255 where both views show the point. Without a mask
 occlusion is derived from both disparities, if there are both. Pictures in other light, from other directions or at
 other sizes (`Piano` and `PianoL`, `chess1` and `chess2`, `trainingQ` and `trainingF`) are of one scene.
 """
@@ -28,30 +28,33 @@ ETH3D_IMAGES = "two_view_training"
 _SHOWN_BY_BOTH = 255
 _VARIANT = re.compile(r"(?<=[a-z])\d?[ELP]?(-(im)?perfect)?$")
 """What tells pictures of one scene apart: the direction of view, the exposure, the light, the rectification."""
-_TRUTH = ("disp{}GT.pfm", "disp{}.pfm")
+_DISPARITY_NAMES = ("disp{}GT.pfm", "disp{}.pfm")
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a disparity whose missing values are infinite. Raises FormatError."""
+    """Read a Middlebury disparity: (H, W) float32 px, NaN where there is none.
+
+    Raises FormatError for a file that is none.
+    """
     disparity = read_pfm(path)
     disparity[np.isinf(disparity)] = np.nan
     return disparity
 
 
-def read_labels(truth: Path, mask: Path) -> NDArray[np.uint8]:
-    """Labels from `mask0nocc.png`. Raises FormatError."""
-    disparity = read_disparity(truth)
+def read_labels(disparity_left: Path, mask: Path) -> NDArray[np.uint8]:
+    """Occlusion labels (H, W) of the left view from its disparity and `mask0nocc.png`. Raises FormatError."""
+    disparity = read_disparity(disparity_left)
     shown = read_png(mask)
-    hidden = ((shown if shown.ndim == 2 else shown[..., 0]) != _SHOWN_BY_BOTH) & ~np.isnan(disparity)
-    return occlusion_from_mask(disparity, hidden)
+    not_visible = ((shown if shown.ndim == 2 else shown[..., 0]) != _SHOWN_BY_BOTH) & ~np.isnan(disparity)
+    return occlusion_from_mask(disparity, not_visible)
 
 
-def scene_frame(name: str, scene_name: str, images: Path, truths: Path) -> FileFrame | None:
-    """The frame of a scene's folders, or None without truth."""
-    left = _truth(truths, 0)
+def scene_frame(name: str, scene_name: str, images: Path, ground_truth: Path) -> FileFrame | None:
+    """The frame of a scene with these folders, or None if there is no ground truth."""
+    left = _disparity_file(ground_truth, 0)
     if left is None:
         return None
-    right, mask = _truth(truths, 1), truths / "mask0nocc.png"
+    right, mask = _disparity_file(ground_truth, 1), ground_truth / "mask0nocc.png"
     return FileFrame(
         name=name,
         scene_name=scene_name,
@@ -63,8 +66,8 @@ def scene_frame(name: str, scene_name: str, images: Path, truths: Path) -> FileF
     )
 
 
-def _truth(folder: Path, view: int) -> Path | None:
-    return next((path for name in _TRUTH if (path := folder / name.format(view)).is_file()), None)
+def _disparity_file(folder: Path, view: int) -> Path | None:
+    return next((path for name in _DISPARITY_NAMES if (path := folder / name.format(view)).is_file()), None)
 
 
 def _recognises(root: Path) -> bool:

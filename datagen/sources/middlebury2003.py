@@ -1,9 +1,9 @@
-"""Middlebury 2003, Cones and Teddy (Scharstein and Szeliski, CVPR 2003): a folder a scene with `im2`, `im6`, `disp2`,
-`disp6` as PPM and PGM, or as PNG.
+"""Middlebury 2003, Cones and Teddy (Scharstein and Szeliski, CVPR 2003). Every scene has a folder with `im2`, `im6`,
+`disp2`, `disp6` as PPM and PGM, or as PNG.
 
-Disparities of the left (2) and right (6) view in 8 bits: grey value over a scale that goes with the resolution, 4
-for the quarter-size images (450 x 375), 2 for half size, 1 for full size; 0 where there is none. Occlusion is derived
-from both.
+The disparities of the left (2) and right (6) view have 8 bits. They are the grey value divided by a scale that depends
+on the resolution: 4 for the quarter-size images (450 x 375), 2 for half size, 1 for full size; grey 0 where there is
+none. Occlusion is derived from both.
 """
 
 from __future__ import annotations
@@ -21,11 +21,14 @@ from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
 _SCALES = ((450, 4), (900, 2), (1800, 1))
-"""Grey values a pixel of disparity, up to each image width."""
+"""(largest image width, grey values per pixel of disparity)."""
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a disparity of the 2003 sets, NaN where there is none. Raises FormatError."""
+    """Read a disparity of the 2003 sets: (H, W) float32 px, NaN where there is none.
+
+    Raises FormatError for a file that is none.
+    """
     values = read_raster(path)
     if values.dtype != np.uint8 or values.ndim != 2:
         raise FormatError(f"{path}: a Middlebury 2003 disparity is 8-bit grey, not {values.dtype}")

@@ -1,4 +1,4 @@
-"""Our own data sets (docs/conventions.md): nothing is derived."""
+"""StereoForge's own data sets (docs/conventions.md). Nothing is derived: they have all ground truth."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from datagen.dataset.layout import RENDER_PASSES, SPLITS
+from datagen.dataset.layout import RENDER_PASSES, SPLITS, Layout
 from datagen.dataset.samples import StereoDataset, StereoSample, open_layout
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import StereoFrame
@@ -14,8 +14,8 @@ from datagen.sources.webdataset import INDEX_NAME
 
 
 def _recognises(root: Path, render_pass: str) -> bool:
-    """Whether it is a data set of ours; one with the images of the final pass alone is recognised by that pass."""
-    if not (root / "recipe.yaml").is_file() or (root / INDEX_NAME).is_file():  # Shards have a recipe too.
+    """Whether it is a StereoForge data set; one with only the final pass is recognised by that pass."""
+    if not Layout(root).recipe.is_file() or (root / INDEX_NAME).is_file():  # Shards have a recipe too.
         return False
     clean, final = ((root / RENDER_PASSES[name]).is_dir() for name in ("clean", "final"))
     return (final and not clean) == (render_pass == "final")
@@ -37,7 +37,7 @@ FORMATS = tuple(
         SPLITS,
     )
     for name, title, render_pass in (
-        ("native", "a data set of ours", "clean"),
-        ("native-final", "a data set of ours (final pass)", "final"),
+        ("native", "a StereoForge data set", "clean"),
+        ("native-final", "a StereoForge data set (final pass)", "final"),
     )
 )

@@ -1,8 +1,8 @@
-"""Where frames come from: one way to open every data set that can be trained or evaluated on.
+"""One way to open every data set that can be trained or evaluated on.
 
 A source is written `[FORMAT:]LOCATION[#FIRST-LAST]`, for example `data`, `kitti2015:/sets/kitti`, `sintel:sets/sintel`,
 `webdataset:s3://bucket/set` or `kitti2015:/sets/kitti#0-99` (its first hundred frames). Without a format the folder's
-own structure tells it. A new format is one module in `datagen.sources` with a tuple `FORMATS`.
+structure decides. A new format is one module in `datagen.sources` with a tuple `FORMATS`.
 """
 
 from __future__ import annotations
@@ -23,14 +23,15 @@ class SourceFormat:
     """How one kind of data set is recognised and listed."""
 
     name: str
+    """What the user writes in front of the location."""
     title: str
-    """What it is, for error messages and documentation."""
+    """The data set's name in messages and documentation."""
     recognises: Callable[[Path], bool]
-    """Whether a folder looks like it. Never True for a folder of another format."""
+    """Whether a folder has this format. Never True for a folder of another format."""
     find_frames: Callable[[str, str], Sequence[StereoFrame]]
-    """(location, split) to the frames with ground truth, in order. A format without splits ignores the split."""
+    """From (location, split) to the frames with ground truth, in order. A format without splits ignores the split."""
     splits: tuple[str, ...] = ()
-    """The splits that the format itself tells apart; empty if all its frames belong to every split."""
+    """The splits that the format has; empty if all its frames belong to every split."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +40,15 @@ class DataSource:
 
     format: SourceFormat
     location: str
+    """Folder, file or URL."""
     selection: tuple[int, int] | None = None
-    """Numbers of the first and the last frame taken, of those in order; None takes all."""
+    """Numbers of the first and the last frame to take, from 0; None for all frames."""
 
     def frames(self, split: str) -> Sequence[StereoFrame]:
         """The frames of a split: "train", "val" or "test".
 
-        A set without splits of its own gives all its frames for each, and one with other splits none for those
-        it does not have. Raises DatasetError if there is nothing, or less than the selection asks for.
+        A set without splits has all its frames in each of them. Raises DatasetError if the set has no such split, no
+        frame in it, or fewer frames than the selection asks for.
         """
         if self.format.splits and split not in self.format.splits:
             raise DatasetError(f"{self.location}: {self.format.title} has no split {split!r}")
@@ -65,20 +67,22 @@ class DataSource:
         return frames[first : last + 1]
 
     def validation_frames(self) -> Sequence[StereoFrame]:
-        """The frames of the set's own validation split, empty where it has none."""
+        """The frames of the set's own validation split, empty if it has none."""
         return self.format.find_frames(self.location, "val") if "val" in self.format.splits else []
 
     def held_out_frames(self) -> Sequence[StereoFrame]:
-        """What to validate on when the whole source is meant for it: its val split, else its test split, else all
-        of it. Raises DatasetError as `frames` does."""
+        """The frames to validate on if the whole source is meant for it: the val split, else the test split, else all.
+
+        Raises DatasetError as `frames` does.
+        """
         splits = self.format.splits
         return self.frames("test" if "val" not in splits else "val")
 
 
 def open_source(text: str | Path) -> DataSource:
-    """Open what `[FORMAT:]LOCATION[#FIRST-LAST]` says.
+    """Open a data set written as `[FORMAT:]LOCATION[#FIRST-LAST]`.
 
-    Raises DatasetError for a folder that is missing, or that no format (or more than one) recognises.
+    Raises DatasetError for a folder that is missing, or whose format is unknown or ambiguous.
     """
     location, selection = str(text), None
     if not Path(location).exists() and (match := _SELECTION.fullmatch(location)):
@@ -103,7 +107,7 @@ def open_source(text: str | Path) -> DataSource:
 
 
 def source_formats() -> dict[str, SourceFormat]:
-    """Every format by its name."""
+    """All formats by their names."""
     import datagen.sources
     from scenes.discovery import modules_in
 

@@ -1,10 +1,10 @@
 """FlyingThings3D, Driving and Monkaa (Mayer et al., CVPR 2016), as downloaded: `frames_cleanpass` or
 `frames_finalpass` beside `disparity`.
 
-Disparities are PFM in pixels for both views. Most files are positive, some (right views of Driving, the subset for
-DispNet and FlowNet 2.0) negative throughout, so a file whose median is negative is turned. What still is negative
-then, or larger than the image is wide, is an error of the set (FlyingThings3D has such frames) and becomes NaN.
-Occlusion is derived from both disparities.
+The disparities of both views are PFM files in pixels. Most files are positive. Some are negative throughout (right
+views of Driving, the subset for DispNet and FlowNet 2.0), so a file whose median is negative is negated. A value that
+is still negative then, or larger than the image is wide, is an error of the set (FlyingThings3D has such frames) and
+becomes NaN. Occlusion is derived from both disparities.
 
 A scene of FlyingThings3D is a folder of frames. Driving is one street, seen with two lenses, in two directions and at
 two speeds. Monkaa's folders show eight worlds, most of them more than once: `eating_x2` and `eating_camera2_x2`.
@@ -33,7 +33,10 @@ _VARIANT = re.compile(r"(_(camera2|naked|augmented\d|difftex\d?|winter))*_x2$")
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a SceneFlow disparity as positive pixels, NaN where it is none. Raises FormatError."""
+    """Read a SceneFlow disparity: (H, W) float32 px, positive, NaN where invalid.
+
+    Raises FormatError for a file that is none.
+    """
     disparity = read_pfm(path)
     if np.nanmedian(disparity) < 0:
         disparity = -disparity

@@ -1,8 +1,8 @@
 """MPI Sintel stereo (Butler et al., ECCV 2012): `training/{clean,final}_{left,right}`, `disparities`,
 `occlusions`, `outofframe`.
 
-Disparity of the left view only, in a colour PNG: d = 4 R + G / 64 + B / 16384 pixels, valid everywhere. The two
-masks are white where the right view does not show the point.
+There is a disparity of the left view only. It is a colour PNG file with d = 4 R + G / 64 + B / 16384 pixels, valid
+everywhere. The two masks are white where the right view does not show the point.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats import read_png
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.formats.picture import read_picture
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 
@@ -26,7 +26,7 @@ _UNITS = np.array([4, 1 / 64, 1 / 16384], np.float32)
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a Sintel disparity. Raises FormatError."""
+    """Read a Sintel disparity: (H, W) float32 px. Raises FormatError for a file that is none."""
     colors = read_png(path)
     if colors.dtype != np.uint8 or colors.ndim != 3:
         raise FormatError(f"{path}: a Sintel disparity is an 8-bit colour PNG, not {colors.dtype}")
@@ -35,9 +35,9 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
 
 
 def read_labels(occlusion: Path, out_of_frame: Path) -> NDArray[np.uint8]:
-    """Join the two masks into our labels. Raises FormatError."""
-    hidden, outside = (_mask(read_png(path)) for path in (occlusion, out_of_frame))
-    return np.where(outside, OUT_OF_FRAME, np.where(hidden, OCCLUDED, VISIBLE)).astype(np.uint8)
+    """Occlusion labels (H, W) from Sintel's two masks. Raises FormatError for files that are none."""
+    occluded, outside = (_mask(read_png(path)) for path in (occlusion, out_of_frame))
+    return np.where(outside, OUT_OF_FRAME, np.where(occluded, OCCLUDED, VISIBLE)).astype(np.uint8)
 
 
 def _mask(image: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""One rectified pair with ground truth, whichever data set it comes from."""
+"""A rectified stereo pair with ground truth, from any data set."""
 
 from __future__ import annotations
 
@@ -18,19 +18,22 @@ DisparityMap = NDArray[np.float32]
 
 
 class StereoFrame(Protocol):
-    """What every source's frames have; a `StereoSample` of our own sets is one, with more beside it.
+    """What the frames of every source have. A `StereoSample` of StereoForge's own sets is one and has more.
 
-    Arrays are read when they are asked for. Reading raises DatasetError, naming the file.
+    Arrays are read at first use. Reading raises DatasetError, naming the file.
     """
 
     @property
     def name(self) -> str:
-        """Unique within its source."""
+        """A name that is unique within the source."""
 
     @property
     def scene_name(self) -> str:
-        """Which of its source's scenes it is of: frames of one scene show the same things at other moments, from other
-        places, in other light, so they are no independent draws."""
+        """The scene of the source that the frame belongs to.
+
+        Frames of one scene show the same things at other moments, from other places or in other light. So they are not
+        independent samples.
+        """
 
     @property
     def size(self) -> tuple[int, int]:
@@ -50,7 +53,7 @@ class StereoFrame(Protocol):
 
     @property
     def disparity_right(self) -> DisparityMap | None:
-        """(H, W) pixels, x_left = x_right + d; None where the set has none."""
+        """(H, W) pixels, x_left = x_right + d; None if the set has none."""
 
     @property
     def gradient_left(self) -> NDArray[np.float32]:
@@ -58,28 +61,31 @@ class StereoFrame(Protocol):
 
     @property
     def gradient_valid_left(self) -> NDArray[np.bool_]:
-        """(H, W) where the gradient exists and is no discontinuity."""
+        """(H, W) True where the gradient exists and is no discontinuity."""
 
     @property
     def occlusion_left(self) -> NDArray[np.uint8] | None:
-        """(H, W) 0 visible in the right image, 1 occluded, 2 out of its frame; None where nobody knows."""
+        """(H, W) 0 visible in the right view, 1 occluded there, 2 out of its frame; None if it is not known."""
 
     @property
     def object_index_left(self) -> NDArray[np.uint16] | None:
-        """(H, W) 0 where nothing is hit (sky), else a number an object; None where the set has none."""
+        """(H, W) 0 where nothing is hit (sky), else the number of an object; None if the set has none."""
 
     @property
     def foreground_left(self) -> NDArray[np.uint16] | None:
-        """(H, W) 0 background, else a number a foreground object: KITTI's object map, whose foreground is its cars.
-        None where the set does not tell one from the other."""
+        """(H, W) 0 background, else the number of a foreground object, as in KITTI's object map, where those are cars.
+
+        None if the set does not tell foreground from background.
+        """
 
 
 @dataclass(frozen=True)
 class FileFrame:
-    """A frame of somebody else's data set: how each of its arrays is read, None for what the set does not have.
+    """A `StereoFrame` of somebody else's data set: how each of its arrays is read, None for what the set lacks.
 
-    Gradients are always derived from the disparity; occlusion is the set's own where `read_occlusion_left` is
-    given, derived from both disparities where the set has both, and unknown otherwise.
+    Gradients are derived from the disparity. Occlusion is the set's own if `read_occlusion_left` is given, derived
+    from both disparities if the set has both, and otherwise unknown. An array is read once and kept; DatasetError is
+    raised for one that does not have the size of the left image.
     """
 
     name: str
@@ -94,37 +100,45 @@ class FileFrame:
 
     @property
     def size(self) -> tuple[int, int]:
+        """(height, width) in pixels, from the left image."""
         height, width = self.left.shape[:2]
         return height, width
 
     @cached_property
     def left(self) -> Picture:
+        """(H, W, 3) uint8 sRGB."""
         return self.read_left()
 
     @cached_property
     def right(self) -> Picture:
+        """(H, W, 3) uint8 sRGB."""
         return self._checked("right image", self.read_right())
 
     @cached_property
     def disparity_left(self) -> DisparityMap:
+        """(H, W) float32 px; NaN invalid, 0 infinitely far."""
         return self._checked("left disparity", self.read_disparity_left())
 
     @cached_property
     def disparity_right(self) -> DisparityMap | None:
+        """(H, W) float32 px; None if the set has none."""
         if self.read_disparity_right is None:
             return None
         return self._checked("right disparity", self.read_disparity_right())
 
     @property
     def gradient_left(self) -> NDArray[np.float32]:
+        """(H, W, 2) forward differences [dx, dy], 0 where there is none."""
         return self._gradient_left[0]
 
     @property
     def gradient_valid_left(self) -> NDArray[np.bool_]:
+        """(H, W) True where the gradient exists and is no discontinuity."""
         return self._gradient_left[1]
 
     @cached_property
     def occlusion_left(self) -> NDArray[np.uint8] | None:
+        """(H, W) 0 visible in the right view, 1 occluded there, 2 out of its frame; None if it is not known."""
         if self.read_occlusion_left is not None:
             return self._checked("occlusion", self.read_occlusion_left())
         if self.disparity_right is None:
@@ -133,12 +147,14 @@ class FileFrame:
 
     @cached_property
     def object_index_left(self) -> NDArray[np.uint16] | None:
+        """(H, W) 0 where nothing is hit (sky), else the number of an object; None if the set has none."""
         if self.read_object_index_left is None:
             return None
         return self._checked("object index", self.read_object_index_left())
 
     @cached_property
     def foreground_left(self) -> NDArray[np.uint16] | None:
+        """(H, W) 0 background, else the number of a foreground object; None if the set does not tell."""
         if self.read_foreground_left is None:
             return None
         return self._checked("foreground", self.read_foreground_left())
@@ -157,8 +173,11 @@ class FileFrame:
 
 
 class FileFrames(Sequence[StereoFrame]):
-    """Frames of somebody else's data set. A frame keeps what it has read, so it is handed out anew every time:
-    nothing piles up in a run that goes through a set many times."""
+    """The frames of somebody else's data set.
+
+    A frame keeps what it has read. So each access returns a new frame, and memory does not grow in a run that goes
+    through a set many times.
+    """
 
     def __init__(self, frames: Iterable[FileFrame]) -> None:
         self._frames = tuple(frames)

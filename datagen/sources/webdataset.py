@@ -1,7 +1,8 @@
-"""WebDataset shards as `stereoforge export` writes them (docs/conventions.md): `<split>-%06d.tar`, local or at any URL
-fsspec opens; samples `<split>-<scene>-<frame>` whose members are encoded as the native tree's files.
+"""WebDataset shards as `stereoforge export` writes them (docs/conventions.md).
 
-Gradients are derived from the disparity, which gives the native tree's numbers again; everything else is read.
+The shards are `<split>-%06d.tar`, local or at any URL that fsspec opens. Their samples `<split>-<scene>-<frame>` have
+members that are encoded as the files of the native tree. Gradients are derived from the disparity, which gives the same
+numbers as the native tree has. Everything else is read.
 """
 
 from __future__ import annotations
@@ -30,10 +31,12 @@ from datagen.formats.pfm import decode_pfm
 from datagen.formats.png import decode_png
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
+from stereoforge_kit.errors import InputError
 
 INDEX_NAME = "index.json"
+"""The file that lists the shards of a folder, their samples and their SHA-256."""
 META = "meta.json"
-"""The member that describes its sample, with the SHA-256 of the other ones."""
+"""The member that describes its sample, with the SHA-256 of the others."""
 _DESCRIPTIONS_KEPT = 256
 _KEY = re.compile(rf"((?:{'|'.join(SPLITS)})-\d{{4,}})-\d{{4,}}")
 _SHARD_NAME = re.compile(rf"({'|'.join(SPLITS)})-\d{{6,}}\.tar")
@@ -41,8 +44,10 @@ _SHARD_NAME = re.compile(rf"({'|'.join(SPLITS)})-\d{{6,}}\.tar")
 
 @dataclass(frozen=True)
 class ShardFrames(Sequence[StereoFrame]):
-    """The samples of one split's shards, in order. No shard is opened before one of its samples is read, if the
-    folder has an index."""
+    """The samples of one split's shards, in order.
+
+    If the folder has an index, a shard is opened only when one of its samples is read.
+    """
 
     samples: tuple[tuple[str, str], ...]
     """(shard, key) of every sample."""
@@ -63,15 +68,19 @@ class ShardFrames(Sequence[StereoFrame]):
 
     @property
     def family(self) -> str | None:
-        """The family of our worlds that they show, as the first sample describes itself; None where it does not say.
-        Raises FormatError."""
+        """The family of the worlds, from the description of the first sample; None if it has none.
+
+        Raises FormatError for a damaged description.
+        """
         family = _description(*self.samples[0]).get("family") if self.samples else None
         return family if isinstance(family, str) else None
 
     @cached_property
     def groups(self) -> list[int]:
-        """How many samples of each shard there are, in order: whoever draws frames at random does well to stay in
-        a few shards at a time."""
+        """The number of samples in each shard, in order.
+
+        Random access is fast if it stays in a few shards at a time.
+        """
         return [len(list(samples)) for _, samples in groupby(self.samples, key=itemgetter(0))]
 
 
@@ -95,16 +104,16 @@ def _find(location: str, split: str) -> Sequence[StereoFrame]:
 
 @dataclass(frozen=True)
 class ShardSetIndex:
-    """What `index.json` says of the shards beside it."""
+    """The content of `index.json`, which describes the shards beside it."""
 
     shards: dict[str, list[str]]
-    """Names to the keys of their samples."""
+    """The keys of the samples by the shard's name."""
     files: tuple[FileEntry, ...]
-    """Sizes and SHA-256; none where the index is not of our own making."""
+    """Sizes and SHA-256 of the shards; empty if another tool wrote the index."""
 
 
 def read_index(location: str) -> ShardSetIndex | None:
-    """The index of a folder of shards, None if it has none. Raises DatasetError for a damaged one."""
+    """The index of a folder of shards, None if there is none. Raises DatasetError for an index that is damaged."""
     if location.endswith(".tar"):
         return None
     url = f"{location.rstrip('/')}/{INDEX_NAME}"
@@ -126,14 +135,18 @@ def read_index(location: str) -> ShardSetIndex | None:
             and all(isinstance(key, str) for key in keys)
             for name, keys in index.shards.items()
         ):
-            raise ValueError("a shard's name or its list of samples is not as it should be")
+            raise InputError("a shard's name or its list of samples is not as it should be")
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FormatError(f"{url}: is not an index of shards ({error})") from error
     return index
 
 
 def scene_of(key: str) -> str:
-    """The scene of a sample by its key: `<split>-<scene>` of ours, the folder of keys with one, else its own."""
+    """The scene that a sample's key names.
+
+    It is `<split>-<scene>` for keys of StereoForge and the folder for keys with one. Other samples are scenes of
+    their own.
+    """
     match = _KEY.fullmatch(key)
     return match[1] if match else key.rpartition("/")[0] or key
 
@@ -170,7 +183,7 @@ def _read(shard: str, key: str, member: str, decode: Any) -> Any:
 
 
 def _digest(shard: str, key: str, member: str) -> str | None:
-    """The SHA-256 of a sample's member, if the sample says it; shards that others made may not."""
+    """The SHA-256 of a sample's member if its description has one; other tools may write none."""
     digests = _description(shard, key).get("sha256", {})
     if not isinstance(digests, dict):
         raise FormatError(f"{shard}: {key}.{META} does not describe its sample (sha256 is no object)")
@@ -179,7 +192,7 @@ def _digest(shard: str, key: str, member: str) -> str | None:
 
 @lru_cache(maxsize=_DESCRIPTIONS_KEPT)
 def _description(shard: str, key: str) -> dict[str, Any]:
-    """What a sample says of itself; nothing, where it has no such member."""
+    """A sample's description of itself; empty if it has no such member."""
     content = read_sample_member(shard, key, META)
     if content is None:
         return {}

@@ -1,1 +1,1 @@
-"""Every file against its manifest, every disparity against its scene; and repair."""
+"""Verifying data sets: every file against its manifest, every disparity against its scene; and repair."""

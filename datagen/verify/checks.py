@@ -1,9 +1,9 @@
-"""What the arrays of one frame must satisfy among themselves. Each check yields one sentence a problem.
+"""Checks of one frame's arrays against one another. Each yields one sentence for each problem.
 
-The limits on shares of pixels leave room for silhouettes, where the rounding of rays decides, and for things
-thinner than a pixel, which the neighbouring pixels of the other view miss. Measured on flying_things from
-96 x 54 to 480 x 270, the largest shares are a tenth to a third of the limits; an error of convention (sign,
-half a pixel, swapped views) moves nearly all pixels.
+The limits on shares of pixels leave room for silhouettes, where the rounding of rays decides, and for things thinner
+than a pixel, which the neighbouring pixels of the other view miss. On flying_things from 96 x 54 to 480 x 270 the
+largest shares measured are a tenth to a third of the limits. An error of convention (sign, half a pixel, swapped views)
+moves nearly all pixels.
 """
 
 from __future__ import annotations
@@ -15,35 +15,31 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from datagen.dataset.layout import Eye
-from datagen.ground_truth.labels import (
-    OCCLUDED,
-    OUT_OF_FRAME,
-    VISIBLE,
-    forward_differences,
-    gradient_validity,
-)
+from datagen.dataset.layout import View
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
+from datagen.ground_truth.labels import forward_differences, gradient_validity
 from datagen.ground_truth.raycast import Hits
 
 CONSISTENCY_TOLERANCE_PX = 0.25
 """How far a visible pixel's disparity may lie outside those of the two pixels it falls between."""
 NEARER_PX = 1e-2
-"""What hides a point has a disparity greater than the point's by more than this."""
+"""A surface that occludes a point has a disparity greater than the point's by more than this."""
 MAX_INCONSISTENT = 0.1
-"""Share of pixels whose two views may disagree, by what the neighbouring pixels there show."""
+"""Share of pixels in which the two views may disagree."""
 FRAME_TIE_PX = 1e-3
-"""A point this close to the other frame's edge may be labelled either way."""
+"""A point this close to the edge of the other view's frame may have either label."""
 GEOMETRY_TOLERANCE_PX = 1e-2
+"""How far a sampled disparity may be from the scene's geometry."""
 MAX_OFF_GEOMETRY = 0.01
 """Share of sampled pixels that may differ from the scene's geometry by more than the tolerance."""
 MAX_OFF_LABELS = 0.03
-"""Share of sampled pixels whose occlusion may differ: boundaries of occlusion are longer than silhouettes."""
+"""Share of sampled pixels whose occlusion label may differ: boundaries of occlusion are longer than silhouettes."""
 MIN_COUNTED = 50
-"""Shares of fewer pixels than this say nothing."""
+"""Shares of fewer pixels than this are not judged."""
 
 
 def check_disparity(disparity: NDArray[np.float32]) -> Iterator[str]:
-    """Finite and not negative everywhere: a rendered world has no pixel without ground truth."""
+    """A disparity (H, W) is finite and not negative: a rendered world has no pixel without ground truth."""
     wrong = int((~np.isfinite(disparity)).sum())
     if wrong:
         yield f"{wrong} disparities are not finite"
@@ -58,7 +54,10 @@ def check_gradient(
     valid: NDArray[np.bool_],
     threshold_px: float,
 ) -> Iterator[str]:
-    """Valid gradients are the disparity's forward differences; valid is where none passes the threshold."""
+    """Valid gradients (H, W, 2) are the disparity's forward differences.
+
+    The mask valid (H, W) is True where neither difference exceeds the threshold.
+    """
     expected = forward_differences(disparity)
     wrong = int(((gradient != expected).any(axis=-1) & valid).sum())
     if wrong:
@@ -71,7 +70,7 @@ def check_gradient(
 def check_object_index(
     index: NDArray[np.uint16], disparity: NDArray[np.float32], objects: int
 ) -> Iterator[str]:
-    """Indices name objects that exist, and the sky (index 0) is what is infinitely far."""
+    """Object indices (H, W) name objects that exist, and exactly the sky (index 0) is infinitely far."""
     if index.max() > objects:
         yield f"object index {index.max()} is beyond the scene's {objects} objects"
     wrong = int(((index == 0) != (disparity == 0)).sum())
@@ -80,23 +79,23 @@ def check_object_index(
 
 
 def check_views(
-    eye: Eye,
+    view: View,
     disparity: NDArray[np.float32],
     other_disparity: NDArray[np.float32],
     occlusion: NDArray[np.uint8],
 ) -> Iterator[str]:
-    """The two views' disparities and the labels agree, seen from `eye`.
+    """The occlusion labels (H, W) of one view agree with both views' disparities (H, W).
 
-    A visible point has in the other view a disparity between those of the two pixels it falls between; an
-    occluded one falls on or beside something nearer; one is out of the frame if its x says so.
+    A visible point falls between two pixels of the other view and has a disparity between theirs. An occluded point
+    falls on or beside something nearer. A point is out of frame exactly if its x coordinate is.
     """
-    x, low, high = _in_other_view(eye, disparity, other_disparity)
+    x, low, high = _in_other_view(view, disparity, other_disparity)
     width = disparity.shape[1]
     outside = (x < 0) | (x > width)
     tie = np.minimum(np.abs(x), np.abs(x - width)) < FRAME_TIE_PX
     wrong = int((((occlusion == OUT_OF_FRAME) != outside) & ~tie).sum())
     if wrong:
-        yield f"{wrong} pixels are labelled against where their disparity puts them in the other frame"
+        yield f"{wrong} pixels have a label that contradicts their place in the other view"
     tolerance = CONSISTENCY_TOLERANCE_PX
     unmet = (disparity < low - tolerance) | (disparity > high + tolerance)
     yield from _too_many(
@@ -104,12 +103,12 @@ def check_views(
         MAX_INCONSISTENT,
         "visible pixels have another disparity than the other view has there",
     )
-    # What hides a point may be thinner than a pixel and miss the centres next to it: look one pixel further.
-    _, _, nearest = _in_other_view(eye, disparity, maximum_filter(other_disparity, size=3))
+    # What occludes a point may be thinner than a pixel and miss the centres next to it: look one pixel further.
+    _, _, nearest = _in_other_view(view, disparity, maximum_filter(other_disparity, size=3))
     yield from _too_many(
         (nearest <= disparity + NEARER_PX)[occlusion == OCCLUDED],
         MAX_INCONSISTENT,
-        "occluded pixels have nothing nearer before them in the other view",
+        "occluded pixels have nothing nearer in front of them in the other view",
     )
 
 
@@ -119,7 +118,7 @@ def check_images(
     disparity_left: NDArray[np.float32],
     occlusion_left: NDArray[np.uint8],
 ) -> Iterator[str]:
-    """The right image warped by the left disparity is more like the left one than warped the wrong way."""
+    """The right image, warped by the left disparity, is more like the left image than if warped the wrong way."""
     visible = (occlusion_left == VISIBLE) & (disparity_left > 1)
     if visible.sum() < MIN_COUNTED:
         return
@@ -128,8 +127,8 @@ def check_images(
     # Textureless pairs fit either way about equally well; only a clear preference for the wrong way counts.
     if right_way > 1.2 * wrong_way + 1:
         yield (
-            f"the images fit the disparity with its sign turned better ({wrong_way:.1f} grey levels of "
-            f"difference) than as it is ({right_way:.1f}): the views are swapped"
+            f"the images fit the negated disparity (mean difference {wrong_way:.1f} grey levels) better than the "
+            f"disparity ({right_way:.1f}): the views are swapped"
         )
 
 
@@ -139,7 +138,7 @@ def check_geometry(
     occlusion: NDArray[np.uint8],
     expected: Hits,
 ) -> Iterator[str]:
-    """Sampled pixels (N,) agree with the rays cast at the scene's meshes."""
+    """The arrays of N sampled pixels agree with the rays cast at the scene's meshes."""
     error = np.abs(disparity - expected.disparity)
     tolerance = GEOMETRY_TOLERANCE_PX
     sentence = f"sampled disparities are over {tolerance} px from the scene's geometry"
@@ -161,7 +160,10 @@ def check_geometry(
 def check_vectors(
     values: NDArray[np.float32], expected: NDArray[np.float32], tolerance: float
 ) -> Iterator[str]:
-    """Sampled values (N,) or (N, C) of a target agree with the scene's geometry; NaN where that is NaN."""
+    """Sampled values (N,) or (N, C) of a target agree with the scene's geometry, and are NaN where that is.
+
+    tolerance: Of the difference, and relative for values above 1.
+    """
     with np.errstate(invalid="ignore"):
         same = np.abs(values - expected) <= tolerance * np.maximum(1, np.abs(expected))
     same |= np.isnan(values) & np.isnan(expected)
@@ -173,29 +175,29 @@ def check_vectors(
 
 
 def check_derived(values: NDArray[Any], expected: NDArray[Any], origin: str) -> Iterator[str]:
-    """A target (H, W) is what follows from others; `origin` names those."""
+    """A target (H, W) is what follows from other targets; `origin` names those."""
     wrong = int((values != expected).sum())
     if wrong:
-        yield f"{wrong} pixels are marked otherwise than {origin} say"
+        yield f"{wrong} pixels do not follow from {origin}"
 
 
 def check_boundaries(marked: NDArray[np.bool_], expected: NDArray[np.bool_]) -> Iterator[str]:
-    """Motion boundaries (H, W) agree with those of the scene's geometry, of the pixels that either marks."""
+    """Motion boundaries (H, W) agree with those of the scene's geometry at the pixels that either marks."""
     either = marked | expected
     yield from _too_many(
         (marked != expected)[either],
         MAX_OFF_LABELS,
-        "pixels of motion boundaries are marked otherwise than the scene's geometry says",
+        "pixels of motion boundaries differ from the scene's geometry",
     )
 
 
 def _in_other_view(
-    eye: Eye, disparity: NDArray[np.float32], other_disparity: NDArray[np.float32]
+    view: View, disparity: NDArray[np.float32], other_disparity: NDArray[np.float32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]:
-    """Where each pixel's point lies in the other view: its x there, and the least and the greatest disparity
-    of the two pixels whose centres it lies between."""
+    """Where each pixel's point is in the other view: its x there, and the least and greatest disparity of the two
+    pixels whose centres it falls between; all (H, W)."""
     width = disparity.shape[1]
-    sign = -1.0 if eye == "left" else 1.0
+    sign = -1.0 if view == "left" else 1.0
     x = np.arange(width) + 0.5 + sign * disparity.astype(np.float64)
     first = np.floor(np.clip(x - 0.5, -1, width)).astype(np.int64)
     rows = np.arange(len(disparity))[:, None]
@@ -210,7 +212,7 @@ def _warp_error(
     disparity: NDArray[np.float32],
     mask: NDArray[np.bool_],
 ) -> float:
-    """Mean absolute difference, in grey levels, of the left image and the right one fetched by x - d."""
+    """Mean absolute difference, in grey levels, of the left image and the right one sampled at x - d."""
     rows, columns = np.nonzero(mask)
     source = np.rint(columns - disparity[mask]).astype(np.int64)
     fetched = right[rows, np.clip(source, 0, right.shape[1] - 1)]

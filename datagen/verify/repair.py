@@ -1,4 +1,4 @@
-"""Rendering again what `verify` found broken, and nothing else."""
+"""Rendering again the scenes that `verify` found broken, and nothing else."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from datagen.dataset.layout import SPLITS, Layout
+from datagen.dataset.layout import SPLITS, Layout, SceneKey
 from datagen.dataset.manifest import SceneManifest
 from datagen.dataset.samples import open_layout
 from datagen.executors import Executor
@@ -16,16 +16,16 @@ from datagen.rendering.staging import discard_uncommitted
 from datagen.verify.report import Problem
 
 
-def broken_scenes(problems: Iterable[Problem]) -> list[tuple[str, int]]:
-    """(split, scene) of every finished scene that a problem lies in, in order."""
+def broken_scenes(problems: Iterable[Problem]) -> list[SceneKey]:
+    """(split, number) of every finished scene with a problem, in order."""
     found = {
         (item.split, item.scene) for item in problems if item.split is not None and item.scene is not None
     }
     return sorted(found, key=lambda scene: (SPLITS.index(scene[0]), scene[1]))
 
 
-def problems_left(problems: Iterable[Problem], repaired: list[tuple[str, int]]) -> list[Problem]:
-    """Those that lie in no finished scene, without the files that a repaired scene has replaced or taken in."""
+def problems_left(problems: Iterable[Problem], repaired: list[SceneKey]) -> list[Problem]:
+    """The problems of no finished scene, without those of files that a repaired scene has replaced or listed."""
     paths = [PurePosixPath(path) for scene in repaired for path in Layout(Path()).scene_paths(*scene)]
     return [
         problem
@@ -37,21 +37,30 @@ def problems_left(problems: Iterable[Problem], repaired: list[tuple[str, int]]) 
 
 def repair_dataset(
     root: Path | str,
-    broken: list[tuple[str, int]],
+    broken: list[SceneKey],
     *,
     executor: Executor | None = None,
     on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
 ) -> RenderSummary:
-    """Remove finished scenes and render them again; interrupted, any later render of the set does the rest.
+    """Remove broken scenes and render them again.
 
-    Raises DatasetError as `render_dataset` does.
+    If this is interrupted, the next render of the data set does the rest.
+
+    Args:
+        root: The data set's folder, or a URL.
+        broken: (split, number) of the scenes.
+        executor: Where scenes are rendered; None for worker processes on this machine.
+        on_scene: Called after each scene with (scenes done, scenes in all, the manifest or None if it failed).
+
+    Raises:
+        DatasetError: As `render_dataset` does.
     """
     layout = open_layout(root)
     recipe = read_recipe(layout.recipe)
     for split, scene in broken:
         layout.tree.remove(Layout(Path()).manifest(split, scene).as_posix())
         discard_uncommitted(layout.tree, split, scene)
-    # A scene beyond the recipe's numbers has no way to be rendered again: it was never asked for.
+    # A scene beyond the recipe's numbers is not rendered again: the recipe does not ask for it.
     splits = {split for split, _ in broken}
     asked = replace(recipe, scenes={split: recipe.scenes.get(split, 0) for split in splits})
     return render_dataset(asked, root, executor=executor, only=broken, on_scene=on_scene)

@@ -1,4 +1,4 @@
-"""What came of checking a data set."""
+"""The result of checking a data set."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong."""
+    """One problem of a data set."""
 
     place: str
     """The file, scene or folder, relative to the data set's root."""
     message: str
+    """What is wrong, as the end of a sentence that begins with the place."""
     split: str | None = None
     scene: int | None = None
-    """The scene to render again; None where no scene is to blame."""
+    """The number of the scene to render again; None if no finished scene is at fault."""
 
     def __str__(self) -> str:
         place = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in self.place)
@@ -23,11 +24,12 @@ class Problem:
 
 @dataclass(frozen=True)
 class VerifyReport:
-    """What was looked at and what was found."""
+    """What was checked and what was found."""
 
     root: str
     """Folder or URL."""
     scenes: int
+    """Number of scenes checked, like frames and files below."""
     frames: int
     files: int
     bytes_read: int
@@ -36,10 +38,12 @@ class VerifyReport:
 
     @property
     def ok(self) -> bool:
+        """Whether there is no problem."""
         return not self.problems
 
     @property
     def megabytes_per_second(self) -> float:
+        """Speed of the check in 10^6 bytes per second."""
         return self.bytes_read / 1e6 / self.seconds if self.seconds else 0.0
 
     def __str__(self) -> str:

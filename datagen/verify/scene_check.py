@@ -1,4 +1,4 @@
-"""All checks of one finished scene: its manifest, its files, its Scene record, its frames' arrays."""
+"""All checks of one finished scene: of its manifest, files, Scene record and frames."""
 
 from __future__ import annotations
 
@@ -8,26 +8,27 @@ from pathlib import Path
 import numpy as np
 
 from datagen.dataset.integrity import compare
-from datagen.dataset.layout import EYES, FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, Layout
+from datagen.dataset.layout import FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, VIEWS, Layout
 from datagen.dataset.manifest import FileEntry, SceneManifest, read_manifest
 from datagen.dataset.samples import StereoSample, read_scene
 from datagen.errors import DatasetError
 from datagen.formats import read_camera_data
 from datagen.ground_truth.raycast import SceneRayCaster
-from datagen.ground_truth.scene_geometry import SceneGeometry
+from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.recipe import Recipe
 from datagen.verify.frame_check import FrameCheck
 from datagen.verify.report import Problem
 from scenes import Scene
 
 SAMPLED_PIXELS = 500
-"""How many random pixels of each view are compared with the scene's geometry by default."""
+"""Number of random pixels of each view that are compared with the scene's geometry by default."""
 POSE_TOLERANCE = 1e-9
+"""How far an element of a pose may be from the scene's."""
 
 
 @dataclass
 class SceneCheck:
-    """Checks one scene; `run` gathers what is wrong in `problems` and never raises for damaged data."""
+    """The check of one scene. `run` collects the problems and never raises for damaged data."""
 
     layout: Layout
     recipe: Recipe
@@ -36,14 +37,15 @@ class SceneCheck:
     sampled_pixels: int = SAMPLED_PIXELS
     problems: list[Problem] = field(default_factory=list)
     known: set[str] = field(default_factory=set)
-    """The scene's files, relative to the root."""
+    """The paths of the scene's files, relative to the root."""
     frames: int = 0
     files: int = 0
     bytes_read: int = 0
     _whole: set[str] = field(default_factory=set)
-    """Those of the files that are as they were written."""
+    """The paths of the files that are intact."""
 
     def run(self) -> SceneCheck:
+        """Check the scene; return this object with its problems and counts."""
         path = self.layout.manifest(self.split, self.scene)
         self.known.add(self.layout.relative(path))
         try:
@@ -61,19 +63,19 @@ class SceneCheck:
             except DatasetError as error:
                 self._failed(error)
             else:
-                caster = SceneRayCaster(SceneGeometry(scene)) if self.sampled_pixels else None
+                caster = SceneRayCaster(build_geometry(scene)) if self.sampled_pixels else None
                 self._check_contents(scene, caster)
         return self
 
     def could_not_run(self, sentence: str) -> None:
-        """Note that the process that ran this check did not survive it."""
+        """Record that the process that ran this check failed."""
         self._found(self.layout.scene_record(self.split, self.scene), f"could not be checked: {sentence}")
 
     def _found(self, path: Path, message: str) -> None:
         self.problems.append(Problem(self.layout.relative(path), message, self.split, self.scene))
 
     def _failed(self, error: ValueError) -> None:
-        """Note what a reader said; its sentence begins with the file's whole path."""
+        """Record a reader's error; its message begins with the file's whole path."""
         place, _, message = str(error).removeprefix(f"{self.layout.root}/").partition(": ")
         self.problems.append(Problem(place, message, self.split, self.scene))
 
@@ -84,7 +86,7 @@ class SceneCheck:
             self._found(path, "was rendered with other settings than the recipe's")
 
     def _is_whole(self, entry: FileEntry) -> bool:
-        """Compare one file with its manifest entry."""
+        """Whether a file is as its entry in the manifest says."""
         size, problem = compare(self.layout, entry)
         self.files += 1
         self.bytes_read += size
@@ -93,7 +95,7 @@ class SceneCheck:
         return problem is None
 
     def _are_readable(self, paths: list[Path]) -> bool:
-        """Whether files that the scene must have are whole; one the manifest does not list is a problem."""
+        """Whether files that the scene must have are intact. A file that the manifest does not list is a problem."""
         names = [self.layout.relative(path) for path in paths]
         for path, name in zip(paths, names, strict=True):
             if name not in self.known:
@@ -111,11 +113,11 @@ class SceneCheck:
 
     def _frame_files(self, frame: int) -> list[Path]:
         kinds = [RENDER_PASSES[name] for name in self.recipe.passes]
-        kinds += [kind for kind in (*TARGETS, *self.recipe.targets) if KINDS[kind].per_eye]
+        kinds += [kind for kind in (*TARGETS, *self.recipe.targets) if KINDS[kind].per_view]
         return [
-            self.layout.file(kind, self.split, self.scene, eye, frame, direction)
+            self.layout.file(kind, self.split, self.scene, view, frame, direction)
             for kind in kinds
-            for eye in EYES
+            for view in VIEWS
             for direction in KINDS[kind].directions
         ]
 
@@ -132,14 +134,14 @@ class SceneCheck:
             self._failed(error)
 
     def _check_camera_data(self, path: Path, scene: Scene) -> None:
-        """The poses on disk are those of the scene's camera."""
+        """Check that the poses on disk are those of the scene's camera."""
         try:
             poses = read_camera_data(path)
         except DatasetError as error:
             self._failed(error)
             return
         camera = scene.camera
-        expected = {FIRST_FRAME + k: [camera.pose(eye, k) for eye in EYES] for k in range(scene.frames)}
+        expected = {FIRST_FRAME + k: [camera.pose(view, k) for view in VIEWS] for k in range(scene.frames)}
         if poses.keys() != expected.keys():
             self._found(path, f"has the frames {sorted(poses)} where the scene has {sorted(expected)}")
             return

@@ -1,4 +1,4 @@
-"""Are exported shards what their index says? Every byte of every shard; no member is decoded."""
+"""Comparing every byte of exported shards with their index. No member is decoded."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from stereoforge_kit.files import LocalTree, Tree
 
 
 def has_shards(tree: Tree) -> bool:
-    """Whether this is an export of shards, and no data set of its own."""
+    """Whether a folder or URL has exported shards instead of a data set."""
     return tree.exists(INDEX_NAME)
 
 
@@ -28,8 +28,13 @@ def verify_shards(
 ) -> VerifyReport:
     """Compare every shard with its size and SHA-256 in the index, several at a time.
 
-    workers: threads, default one a core. Raises DatasetError for an index that is damaged or says nothing of the
-    files, as that of other tools may.
+    Args:
+        tree: The folder or URL of the shards.
+        progress: Called after each shard with (shards done, shards in all).
+        workers: Number of threads; None for one per core.
+
+    Raises:
+        DatasetError: For an index that is damaged, or has no sizes and SHA-256, as other tools may write it.
     """
     start = time.perf_counter()
     index = read_index(tree.name)

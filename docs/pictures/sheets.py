@@ -1,8 +1,8 @@
-"""The contact sheets in docs/families/flying_things.md: one of each kind of shape, texture or finish.
+"""Make the contact sheets of docs/families/flying_things.md: one of each kind of shape, texture or finish.
 
 python docs/pictures/sheets.py shapes|textures|finishes OUT.jpg [--seed 8]
 
-Shapes are drawn by rays from one direction, with one light; finishes are rendered by Blender on a ball over a chequered
+Shapes are ray cast from one direction, with one light. Finishes are rendered by Blender on a ball over a checkered
 floor.
 """
 
@@ -37,12 +37,14 @@ SIDE, LABEL, GAP, COLUMNS = 96, 11, 6, 10
 
 
 def shapes(rng: np.random.Generator) -> Iterator[tuple[str, Picture]]:
+    """Name and picture of one shape of each kind that flying_things draws."""
     for name in sorted(SHAPES):
         if SHAPES[name].popularity > 0:
-            yield name, drawn(SHAPES[name].sample(rng).mesh())
+            yield name, ray_cast_picture(SHAPES[name].sample(rng).mesh())
 
 
 def textures(rng: np.random.Generator) -> Iterator[tuple[str, Picture]]:
+    """Name and picture of one texture of each kind that flying_things draws."""
     for name in sorted(TEXTURES):
         if TEXTURES[name].popularity > 0:
             image = TEXTURES[name].sample(rng, 2 * SIDE).image()
@@ -50,6 +52,7 @@ def textures(rng: np.random.Generator) -> Iterator[tuple[str, Picture]]:
 
 
 def finishes(rng: np.random.Generator) -> Iterator[tuple[str, Picture]]:
+    """Name and rendered picture of a ball in each finish."""
     for name, finish in FINISHES.items():
         ranges = {field: limits for field, limits in vars(finish).items() if field != "share"}
         middle = {field: (low + high) / 2 for field, (low, high) in ranges.items()}
@@ -77,15 +80,15 @@ def ball(material: Material, floor: Texture) -> Scene:
     )
 
 
-def drawn(mesh: Mesh) -> Picture:
-    """A mesh from the front, its triangles shaded by a light from above."""
-    side, up = np.array((-0.57, 0.82, 0.0)), np.array((-0.38, -0.27, 0.88))
-    towards = np.cross(side, up)
-    flat = np.stack([mesh.vertices @ side, mesh.vertices @ up], -1)
+def ray_cast_picture(mesh: Mesh) -> Picture:
+    """An orthographic picture of a mesh, its triangles shaded by a light from above."""
+    right, up = np.array((-0.57, 0.82, 0.0)), np.array((-0.38, -0.27, 0.88))
+    towards = np.cross(right, up)
+    flat = np.stack([mesh.vertices @ right, mesh.vertices @ up], -1)
     middle, half = (flat.max(axis=0) + flat.min(axis=0)) / 2, np.ptp(flat, axis=0).max() * 0.54
     steps = (np.arange(2 * SIDE) + 0.5) / SIDE - 1
     across, down = np.meshgrid(steps * half, -steps * half)
-    origins = (across.ravel() + middle[0])[:, None] * side + (down.ravel() + middle[1])[:, None] * up
+    origins = (across.ravel() + middle[0])[:, None] * right + (down.ravel() + middle[1])[:, None] * up
     origins = origins + 10 * towards
     rays = EmbreeScene()
     TriangleMesh(rays, mesh.vertices.astype(np.float32), mesh.triangles.astype(np.int32))
@@ -94,7 +97,7 @@ def drawn(mesh: Mesh) -> Picture:
     corners = mesh.vertices[mesh.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    light = (0.5 * towards + 0.2 * side + 0.84 * up) @ normals.T
+    light = (0.5 * towards + 0.2 * right + 0.84 * up) @ normals.T
     levels = np.where(triangle < 0, 255.0, 235 * (0.35 + 0.65 * np.clip(light, 0, 1))[triangle])
     small = cv2.resize(levels.reshape(across.shape), (SIDE, SIDE), interpolation=cv2.INTER_AREA)
     return np.repeat(small[..., None], 3, axis=2).astype(np.uint8)

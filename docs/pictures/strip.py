@@ -1,4 +1,4 @@
-"""The strips in the README and docs/families: scenes of a data set side by side, pictures over ground truth.
+"""Make the strips of the README and docs/families: scenes of a data set in columns, images over ground truth.
 
 python docs/pictures/strip.py DATA OUT.jpg [--split test] [--scenes 0 3 5 8] [--width 400] [--rows 4]
 """
@@ -22,7 +22,7 @@ from stereoforge_kit.viewing import (
 
 
 def column(sample: StereoSample, width: int, rows: int) -> Picture:
-    """The first `rows` of left picture, disparity, occlusion and gradients, top to bottom."""
+    """The first `rows` of left image, disparity, occlusion and gradients, top to bottom."""
     pictures = [
         sample.left,
         disparity_picture(sample.disparity_left),

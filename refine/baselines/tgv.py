@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.method import EvaluationFrame, Method, MethodOutput
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.kernels import njit, prange
 from stereoforge_kit.matching import fill_nearest
 
 Map = NDArray[np.float32]
@@ -174,7 +174,7 @@ def _through(tensor: NDArray[Any], vectors: NDArray[Any]) -> tuple[NDArray[Any],
 _MAP, _FIELD = "f4[:,::1]", "f4[:,:,::1]"
 
 
-@njit(f"void({_MAP},{_FIELD},{_FIELD},{_FIELD},{_FIELD},{_MAP},f4,f4,f4)", parallel=True, cache=True)
+@njit(f"void({_MAP},{_FIELD},{_FIELD},{_FIELD},{_FIELD},{_MAP},f4,f4,f4)", parallel=True)
 def _ascend(u, v, p, q, tensor, step_p, step_q, alpha1, alpha0):  # type: ignore[no-untyped-def]
     """p and q go up the gradient at (u, v) and back into their unit balls."""
     height, width = u.shape
@@ -205,7 +205,6 @@ def _ascend(u, v, p, q, tensor, step_p, step_q, alpha1, alpha0):  # type: ignore
 @njit(
     f"void({_MAP},{_FIELD},{_MAP},{_FIELD},{_FIELD},{_FIELD},{_FIELD},{_MAP},{_MAP},{_MAP},{_MAP},f4,f4)",
     parallel=True,
-    cache=True,
 )
 def _descend(u, v, bar_u, bar_v, p, q, tensor, weight, target, step_u, step_v, alpha1, alpha0):  # type: ignore[no-untyped-def]
     """u and v go down the gradient of the coupling with (p, q), u also to its data; bar_* extrapolate."""

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
@@ -16,6 +15,7 @@ from safetensors.numpy import save
 from refine.forest.features import FEATURES, confidence_features
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_bytes
+from stereoforge_kit.kernels import njit, prange
 
 FORMAT = "1"
 LEAF = -1
@@ -105,7 +105,7 @@ def _check(path: Path, forest: Forest) -> None:
         raise ForestError(f"{path}: the trees of its forest lead nowhere")
 
 
-@njit("f4[::1](f4[:,::1], i4[::1], i1[::1], f4[::1], i4[::1], i4[::1], f4[::1])", parallel=True, cache=True)
+@njit("f4[::1](f4[:,::1], i4[::1], i1[::1], f4[::1], i4[::1], i4[::1], f4[::1])", parallel=True)
 def _walk(samples, roots, feature, threshold, left, right, value):  # type: ignore[no-untyped-def]
     result = np.empty(len(samples), np.float32)
     for i in prange(len(samples)):

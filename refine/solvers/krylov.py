@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 
 from refine.energy.affinity import Floats
 from refine.solvers.arrays import Float32Array
@@ -15,6 +14,7 @@ from refine.solvers.linear import LinearSolution, Problem
 from refine.solvers.stencil.operator import StencilOperator
 from refine.solvers.stencil.padding import crop
 from refine.solvers.stencil.right_hand_side import StencilSystem
+from stereoforge_kit.kernels import njit, prange
 
 Preconditioner = Callable[[Float32Array, Float32Array], None]
 """(residual, out): writes M^-1 residual into `out`; both (H, W), padded."""
@@ -159,7 +159,7 @@ def _bicgstab(
     return max_iterations, math.sqrt(operator.residual(b, x, r))
 
 
-@njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
+@njit(parallel=True, fastmath={"contract", "reassoc"})
 def _dot(a, b):
     """In float64."""
     total = 0.0
@@ -171,7 +171,7 @@ def _dot(a, b):
     return total
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _update_direction(direction, correction, beta):
     """direction = correction + beta direction."""
     factor = np.float32(beta)
@@ -180,7 +180,7 @@ def _update_direction(direction, correction, beta):
             direction[y, x] = correction[y, x] + factor * direction[y, x]
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _update_bicgstab_direction(direction, residual, product, beta, omega):
     """direction = residual + beta (direction - omega product)."""
     factor, along = np.float32(beta), np.float32(omega)
@@ -189,7 +189,7 @@ def _update_bicgstab_direction(direction, residual, product, beta, omega):
             direction[y, x] = residual[y, x] + factor * (direction[y, x] - along * product[y, x])
 
 
-@njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
+@njit(parallel=True, fastmath={"contract", "reassoc"})
 def _step(x, residual, direction, product, step):
     """x += step direction, residual -= step product; the squared norm of the new residual."""
     total = 0.0

@@ -12,7 +12,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numba import njit, prange
 
 from refine.energy.affinity import Floats
 from refine.solvers.amg.hierarchy import Hierarchy
@@ -24,6 +23,7 @@ from refine.solvers.linear import LinearSolution, Problem
 from refine.solvers.stencil.operator import StencilOperator, assemble_operator
 from refine.solvers.stencil.right_hand_side import assemble_system
 from refine.solvers.stencil.weights import BandWeights, StencilWeights, data_weight, stencil_weights
+from stereoforge_kit.kernels import njit, prange
 
 MAX_ITERATIONS = 1000
 """Without the gradient term and with a large beta, hundreds are needed, and still faster than a direct solve."""
@@ -122,7 +122,7 @@ class MultigridCycle:
         self._operator.jacobi_step(residual, self._damped_inverse, x, out)
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _pre_smooth(damped_inverse, b, x):
     """x = omega D^-1 b: a step of damped Jacobi from 0."""
     for y in prange(x.shape[0]):

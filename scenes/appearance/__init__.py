@@ -1,1 +1,1 @@
-"""How things look: materials, lights, palettes, painted patterns."""
+"""How things look: materials, lights, palettes, and the tools that textures are painted with."""

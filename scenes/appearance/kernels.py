@@ -1,37 +1,41 @@
-"""What nearly every texture is painted with, compiled: one pass over a picture where numpy takes five or ten.
+"""Compiled kernels that nearly all textures are painted with: one pass over a picture, where numpy takes several.
 
-Each does the arithmetic of the numpy expression it stands for, in the same order and precision, so the same bytes come
-out.
+Each does the arithmetic of the numpy expression it replaces, in the same order and precision, so that the bytes are
+the same.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, vectorize
 
-# Numbers of Python's own would raise the arithmetic to 64 bits.
+from stereoforge_kit.kernels import njit, vectorize
+
+# Python's own numbers would raise the arithmetic to 64 bits.
 _BLACK, _WHITE = np.float32(0), np.float32(255)
 _HALF, _ONE, _TWO, _THREE = np.float32(0.5), np.float32(1), np.float32(2), np.float32(3)
 
 
-@vectorize(["f4(f4,f4,f4)", "f8(f4,f4,f8)", "f8(f8,f8,f8)"], cache=True)
+@vectorize(["f4(f4,f4,f4)", "f8(f4,f4,f8)", "f8(f8,f8,f8)"])
 def blended(below, above, cover):
+    """`above` over `below`, (...) each, with an opacity `cover`."""
     return (above - below) * cover + below
 
 
-@vectorize(["f4(f4)", "f8(f8)"], cache=True)
+@vectorize(["f4(f4)", "f8(f8)"])
 def fraction(value):
+    """The fractional part of (...) values, 0..1."""
     return value - np.floor(value)
 
 
-@vectorize(["f4(f4,f4,f4)", "f8(f8,f4,f4)"], cache=True)
+@vectorize(["f4(f4,f4,f4)", "f8(f8,f4,f4)"])
 def smooth_stepped(value, edge, width):
+    """0 below an edge, 1 above it, with a cubic ramp of a width about it, for (...) values."""
     t = (value - edge) / width + _HALF
     t = min(max(t, _BLACK), _ONE)
     return t * t * (_THREE - _TWO * t)
 
 
-@njit(cache=True)
+@njit()
 def to_bytes(picture):
     """(3, H, W) rounded to (H, W, 3) uint8."""
     _, height, width = picture.shape
@@ -44,9 +48,12 @@ def to_bytes(picture):
     return pixels
 
 
-@njit(cache=True)
+@njit()
 def grained(picture, fine, coarse_weight, fine_weight):
-    """(3, H, W) to (H, W, 3) uint8 with noise (H, W) of one and two pixels' scale, in proportion to the brightness."""
+    """A picture (3, H, W) as (H, W, 3) uint8, with noise from `fine` (H, W) at the scales of one and two pixels.
+
+    The noise is in proportion to the brightness.
+    """
     _, height, width = picture.shape
     lift = np.float32(12)  # A little grain in the blacks too.
     pixels = np.empty((height, width, 3), np.uint8)
@@ -66,12 +73,13 @@ def grained(picture, fine, coarse_weight, fine_weight):
     return pixels
 
 
-@njit(cache=True)
+@njit()
 def nearest_of_grid(x, y, point_x, point_y, cells):
-    """Of points (cells + 2)^2, one in each cell of a grid with a margin of one: each place's nearest.
+    """The nearest of a grid's points to each place, among the points of the 3 x 3 cells around it.
 
-    x, y: (H, W) places, in cells. Returns, (H, W) each, the nearest point among those of the 3 x 3 cells around, and
-    the squared distances to it and to the second nearest.
+    `x`, `y` (H, W) are places, in cells; `point_x`, `point_y` ((cells + 2)^2,) one point in each cell of a grid with a
+    margin of one cell. Returns, (H, W) each, the index of the nearest point and the squared distances to it and to the
+    second nearest.
     """
     height, width = x.shape
     stride = cells + 2
@@ -95,9 +103,9 @@ def nearest_of_grid(x, y, point_x, point_y, cells):
     return nearest, first, second
 
 
-@njit(cache=True)
-def put_on_top(top, inside, row, column, number):
-    """Write a number into a periodic picture (N, N) where a square mask about (row, column) is set."""
+@njit()
+def stamp(top, inside, row, column, number):
+    """Write a number into a periodic picture `top` (N, N) where a square mask about (row, column) is set."""
     size, side = len(top), len(inside)
     for i in range(side):
         for j in range(side):

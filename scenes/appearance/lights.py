@@ -14,7 +14,10 @@ from scenes.spec import AreaLight, Color, SunLight
 
 
 def sample_light_color(rng: np.random.Generator, saturation: float) -> Color:
-    """A light's colour of brightness 1, from candle red to sky blue, or any hue when strongly coloured."""
+    """A light's colour, linear RGB of luminance 1: from candlelight to sky blue, a quarter of them of any hue.
+
+    `saturation` scales how far it is from white.
+    """
     warmth = rng.normal(0.0, 0.5)
     color = np.exp(saturation * np.array([warmth, 0.0, -1.3 * warmth]))
     if chance(rng, 0.25):
@@ -23,7 +26,10 @@ def sample_light_color(rng: np.random.Generator, saturation: float) -> Color:
 
 
 def sample_sun(rng: np.random.Generator, view: NDArray[np.float64]) -> SunLight:
-    """A sun above the horizon, three times in four more behind the camera `view` (4, 4) than before it."""
+    """A sun 15 to 70 degrees above the horizon, for a camera with the camera-to-world matrix `view` (4, 4).
+
+    Three suns in four come from behind the camera rather than from in front of it.
+    """
     elevation = math.radians(uniform(rng, 15.0, 70.0))
     spread = 100.0 if chance(rng, 0.75) else 180.0
     forward = -view[:2, 2] / np.linalg.norm(view[:2, 2])
@@ -42,7 +48,8 @@ def sample_area_light(
 ) -> AreaLight:
     """A lamp above and behind the camera `view`, or beside it, pointing at a target in front of it.
 
-    `distance_m` sets the scale of the lamp's distance to the camera. The power gives the target an
+    `view` (4, 4) is camera to world, `target_m` (3,) in the world. `distance_m` sets the scale of the lamp's
+    distance from the camera. The power gives the target an
     irradiance of about 0.5 to 4 W/m^2 (a small Lambertian lamp gives power / (pi * distance^2)).
     """
     side, up, back = uniform(rng, -1.5, 1.5), uniform(rng, 0.3, 1.8), uniform(rng, 0.1, 1.0)

@@ -1,4 +1,7 @@
-"""What things in landscapes are made of: textures of a stuff in colours of that stuff."""
+"""Textures of the materials of landscapes and characters, in the colours of those materials.
+
+Each function here is a `TextureSampler`, or returns one for a range of colours.
+"""
 
 from __future__ import annotations
 
@@ -24,77 +27,85 @@ from scenes.appearance.palettes import (
     SNOW,
     TILES,
     VIVID,
-    Tones,
-    sample_tones,
+    PaletteRange,
+    sample_palette_in,
 )
 from scenes.random_draws import choose, integer, uniform
 from scenes.spec import Texture
 from scenes.textures.cells import Cobblestones, VoronoiCells
-from scenes.textures.marks import DeadLeaves
+from scenes.textures.collages import DeadLeaves
 from scenes.textures.natural import Hair, Iris, LeafVeins, Litter, RoughBark, Strata
 from scenes.textures.noise import FractalNoise, Labyrinth, WoodPlanks
 from scenes.textures.plain import Gradient
 from scenes.textures.tiles import Bricks, Dots, Stripes, Weave
 
-Stuff = Callable[[np.random.Generator, int], Texture]
-"""Draws a texture of `size` pixels."""
+TextureSampler = Callable[[np.random.Generator, int], Texture]
+"""Draws a texture of `size` x `size` pixels: called with a generator and the size."""
+_Pattern = Dots | Gradient | Labyrinth | Stripes | Weave
+"""Patterns whose colours may be replaced."""
 
 
-def leaves(tones: Tones = FOLIAGE) -> Stuff:
-    def draw(rng: np.random.Generator, size: int) -> Texture:
-        palette = sample_tones(rng, tones, 4)
+def leaves(colors: PaletteRange = FOLIAGE) -> TextureSampler:
+    """Leaves: veined, or blotched where they are too small to show veins."""
+
+    def sample(rng: np.random.Generator, size: int) -> Texture:
+        palette = sample_palette_in(rng, colors, 4)
         if rng.random() < 0.6:
             return LeafVeins.of(rng, size, palette[:3], palette[3])
         return _noise(rng, size, palette)
 
-    return draw
+    return sample
 
 
-def ground(tones: Tones, under: Tones = EARTH) -> Stuff:
-    """Grass, litter, moss or snow over soil: strokes or clouds."""
+def ground(colors: PaletteRange, under: PaletteRange = EARTH) -> TextureSampler:
+    """Grass, litter, moss or snow over soil of the colours `under`."""
 
-    def draw(rng: np.random.Generator, size: int) -> Texture:
-        palette = (sample_tones(rng, under, 2)[0], *sample_tones(rng, tones, 4))
+    def sample(rng: np.random.Generator, size: int) -> Texture:
+        palette = (sample_palette_in(rng, under, 2)[0], *sample_palette_in(rng, colors, 4))
         return Litter.of(rng, size, palette) if rng.random() < 0.65 else _noise(rng, size, palette)
 
-    return draw
+    return sample
 
 
-def grains(tones: Tones) -> Stuff:
-    """Sand, snow, dust: soft clouds and grit of one tone."""
+def grains(colors: PaletteRange) -> TextureSampler:
+    """Sand, snow, dust: soft clouds and grit of one colour."""
 
-    def draw(rng: np.random.Generator, size: int) -> Texture:
+    def sample(rng: np.random.Generator, size: int) -> Texture:
         noise = FractalNoise.sample(rng, size)
-        return replace(noise, palette=sample_tones(rng, tones, 4), slope=uniform(rng, 0.5, 1.0), ridges=False)
+        return replace(
+            noise, palette=sample_palette_in(rng, colors, 4), slope=uniform(rng, 0.5, 1.0), ridges=False
+        )
 
-    return draw
-
-
-def rock(tones: Tones = ROCK, dust: Tones = MOSS) -> Stuff:
-    def draw(rng: np.random.Generator, size: int) -> Texture:
-        return Strata.of(rng, size, sample_tones(rng, tones, 4), sample_tones(rng, dust, 1)[0])
-
-    return draw
+    return sample
 
 
-def masonry(tones: Tones) -> Stuff:
+def rock(colors: PaletteRange = ROCK, dust: PaletteRange = MOSS) -> TextureSampler:
+    """Layered or massive rock with moss, sand or snow in its hollows; `dust` are the colours of those."""
+
+    def sample(rng: np.random.Generator, size: int) -> Texture:
+        return Strata.of(rng, size, sample_palette_in(rng, colors, 4), sample_palette_in(rng, dust, 1)[0])
+
+    return sample
+
+
+def masonry(colors: PaletteRange) -> TextureSampler:
     """Dressed stone: blocks, rubble or plain weathered stone."""
 
-    def draw(rng: np.random.Generator, size: int) -> Texture:
-        palette = sample_tones(rng, tones, 4)
+    def sample(rng: np.random.Generator, size: int) -> Texture:
+        palette = sample_palette_in(rng, colors, 4)
         kind = rng.random()
         if kind < 0.35:
             return replace(Bricks.sample(rng, size), palette=palette[1:], mortar=palette[0])
         if kind < 0.5:
             return replace(Cobblestones.sample(rng, size), palette=palette)
-        return rock(tones)(rng, size)
+        return rock(colors)(rng, size)
 
-    return draw
+    return sample
 
 
 def paving(rng: np.random.Generator, size: int) -> Texture:
     """Cobbles, flagstones or trodden earth."""
-    palette = sample_tones(rng, choose(rng, (ROCK, EARTH, SAND)), 4)
+    palette = sample_palette_in(rng, choose(rng, (ROCK, EARTH, SAND)), 4)
     kind = rng.random()
     if kind < 0.5:
         return replace(Cobblestones.sample(rng, size), palette=palette, cells=integer(rng, 10, 24))
@@ -104,34 +115,42 @@ def paving(rng: np.random.Generator, size: int) -> Texture:
 
 
 def plaster(rng: np.random.Generator, size: int) -> Texture:
-    palette = sample_tones(rng, PLASTER, 4)
+    """Painted or weathered walls."""
+    palette = sample_palette_in(rng, PLASTER, 4)
     return _noise(rng, size, palette) if rng.random() < 0.6 else Strata.of(rng, size, palette, palette[0])
 
 
 def roofing(rng: np.random.Generator, size: int) -> Texture:
-    palette = sample_tones(rng, TILES, 4)
+    """Tiles, or thatch."""
+    palette = sample_palette_in(rng, TILES, 4)
     if rng.random() < 0.7:
         return replace(Bricks.sample(rng, size), palette=palette[1:], mortar=palette[0])
-    return Hair.of(rng, size, sample_tones(rng, DRY_GRASS, 4), palette[0])
+    return Hair.of(rng, size, sample_palette_in(rng, DRY_GRASS, 4), palette[0])
 
 
 def bark(rng: np.random.Generator, size: int) -> Texture:
-    return RoughBark.of(rng, size, sample_tones(rng, BARK, 4), sample_tones(rng, MOSS, 2)[1])
+    """Ridged bark with lichen."""
+    return RoughBark.of(rng, size, sample_palette_in(rng, BARK, 4), sample_palette_in(rng, MOSS, 2)[1])
 
 
 def culm(rng: np.random.Generator, size: int) -> Texture:
-    palette = sample_tones(rng, replace(FOLIAGE, hue_deg=(90.0, 130.0)), 4)
-    return RoughBark.of(rng, size, palette, sample_tones(rng, DRY_GRASS, 2)[1])
+    """The green or yellow stems of bamboo."""
+    palette = sample_palette_in(rng, replace(FOLIAGE, hue_deg=(90.0, 130.0)), 4)
+    return RoughBark.of(rng, size, palette, sample_palette_in(rng, DRY_GRASS, 2)[1])
 
 
 def timber(rng: np.random.Generator, size: int) -> Texture:
-    return replace(WoodPlanks.sample(rng, size), palette=sample_tones(rng, BARK, 2))
+    """Planks."""
+    return replace(WoodPlanks.sample(rng, size), palette=sample_palette_in(rng, BARK, 2))
 
 
 def fur(rng: np.random.Generator, size: int) -> Texture:
-    """Half of them the colours of real animals, half of none."""
-    tones = choose(rng, (HAIR, VIVID))
-    palette, marking = sample_tones(rng, tones, 4), sample_tones(rng, choose(rng, (HAIR, VIVID)), 2)[1]
+    """Fur: half of it in the colours of real animals, half in vivid ones."""
+    colors = choose(rng, (HAIR, VIVID))
+    palette, marking = (
+        sample_palette_in(rng, colors, 4),
+        sample_palette_in(rng, choose(rng, (HAIR, VIVID)), 2)[1],
+    )
     if rng.random() < 0.7:
         return Hair.of(rng, size, palette, marking)
     return replace(Labyrinth.sample(rng, size), palette=(*palette[1:3], marking))
@@ -139,7 +158,7 @@ def fur(rng: np.random.Generator, size: int) -> Texture:
 
 def hide(rng: np.random.Generator, size: int) -> Texture:
     """Bare skin of creatures: scales, spots, blotches."""
-    palette = sample_tones(rng, choose(rng, (VIVID, VIVID, EARTH)), 4)
+    palette = sample_palette_in(rng, choose(rng, (VIVID, VIVID, EARTH)), 4)
     kind = integer(rng, 0, 3)
     if kind == 0:
         return replace(Labyrinth.sample(rng, size), palette=palette[:3])
@@ -151,21 +170,24 @@ def hide(rng: np.random.Generator, size: int) -> Texture:
 
 
 def skin(rng: np.random.Generator, size: int) -> Texture:
-    return _noise(rng, size, sample_tones(rng, SKIN, 3), low_cycles=6.0)
+    """Human skin."""
+    return _noise(rng, size, sample_palette_in(rng, SKIN, 3), low_cycles=6.0)
 
 
 def hair(rng: np.random.Generator, size: int) -> Texture:
-    palette = sample_tones(rng, HAIR, 3)
+    """Human hair."""
+    palette = sample_palette_in(rng, HAIR, 3)
     return replace(Hair.of(rng, size, palette, palette[0]), pattern="none")
 
 
 def leather(rng: np.random.Generator, size: int) -> Texture:
-    return _noise(rng, size, sample_tones(rng, BARK, 3), low_cycles=8.0)
+    """Brown leather."""
+    return _noise(rng, size, sample_palette_in(rng, BARK, 3), low_cycles=8.0)
 
 
 def cloth(rng: np.random.Generator, size: int) -> Texture:
-    """Woven, striped, spotted or plain stuff of one hue."""
-    palette = sample_tones(rng, CLOTH, 3, hue_spread_deg=40.0)
+    """Woven, striped, spotted or plain cloth of one hue."""
+    palette = sample_palette_in(rng, CLOTH, 3, hue_spread_deg=40.0)
     kind = choose(rng, (Weave, Stripes, Dots, Gradient, Labyrinth, None), (0.3, 0.15, 0.1, 0.1, 0.1, 0.25))
     if kind is None:
         return _noise(rng, size, palette, low_cycles=4.0)
@@ -174,7 +196,7 @@ def cloth(rng: np.random.Generator, size: int) -> Texture:
 
 def cap(rng: np.random.Generator, size: int) -> Texture:
     """The skin of mushrooms."""
-    palette = sample_tones(rng, choose(rng, (VIVID, VIVID, EARTH)), 3, hue_spread_deg=40.0)
+    palette = sample_palette_in(rng, choose(rng, (VIVID, VIVID, EARTH)), 3, hue_spread_deg=40.0)
     kind = choose(rng, (Dots, Labyrinth, Gradient, None), (0.3, 0.25, 0.2, 0.25))
     if kind is None:
         return _noise(rng, size, palette)
@@ -182,16 +204,20 @@ def cap(rng: np.random.Generator, size: int) -> Texture:
 
 
 def eye(rng: np.random.Generator, size: int) -> Texture:
+    """The iris, pupil and white of an eye (`scenes.textures.natural.Iris`)."""
     return Iris.sample(rng, size)
 
 
 def horn(rng: np.random.Generator, size: int) -> Texture:
-    return RoughBark.of(rng, size, sample_tones(rng, PLASTER, 3), sample_tones(rng, EARTH, 1)[0])
+    """Pale ridged horn; also the stems of mushrooms."""
+    return RoughBark.of(rng, size, sample_palette_in(rng, PLASTER, 3), sample_palette_in(rng, EARTH, 1)[0])
 
 
 SNOWY = rock(ROCK, SNOW)
+"""Rock with snow in its hollows."""
 DESERT_ROCK = rock(RED_ROCK, SAND)
-BY_NAME: dict[str, Stuff] = {
+"""Red rock with sand in its hollows."""
+CHARACTER_TEXTURES: dict[str, TextureSampler] = {
     "fur": fur,
     "hide": hide,
     "skin": skin,
@@ -202,7 +228,7 @@ BY_NAME: dict[str, Stuff] = {
     "horn": horn,
     "eye": eye,
 }
-"""What figures are made of."""
+"""Texture samplers by the names of `scenes.landscapes.characters.CharacterPart.material`."""
 
 
 def _noise(rng: np.random.Generator, size: int, palette: Palette, low_cycles: float = 3.0) -> Texture:
@@ -210,8 +236,7 @@ def _noise(rng: np.random.Generator, size: int, palette: Palette, low_cycles: fl
     return replace(noise, palette=palette, low_cycles=low_cycles * uniform(rng, 0.7, 1.5))
 
 
-def _recolored(texture: Texture, palette: Palette) -> Texture:
+def _recolored(texture: _Pattern, palette: Palette) -> Texture:
     """The same pattern in other colours, as many as it had."""
-    had = len(texture.palette)  # type: ignore[attr-defined]
-    colors = tuple(palette[k % len(palette)] for k in range(had))
-    return replace(texture, palette=colors)  # type: ignore[call-arg]
+    colors = tuple(palette[k % len(palette)] for k in range(len(texture.palette)))
+    return replace(texture, palette=colors)

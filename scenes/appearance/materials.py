@@ -1,4 +1,4 @@
-"""Random materials: which picture a surface wears, how finely, and how it answers light."""
+"""Materials: which texture a surface has, at which scale, and how it reflects light."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenes.appearance.painting import Srgb
 from scenes.random_draws import Range, choose, log_uniform, uniform
 from scenes.spec import Material, Texture
 from scenes.textures import TEXTURES
+from scenes.textures.plain import SolidColor
 
 
 @dataclass(frozen=True)
@@ -33,11 +35,11 @@ FINISHES: dict[str, Finish] = {
     "glass": Finish(share=0.03, roughness=(0.0, 0.15), specular=(0.5, 0.5), transmission=(0.5, 0.9)),
     "glowing": Finish(share=0.03, emission=(0.2, 1.5)),
 }
-"""Mostly diffuse, which is cheap to render; every other kind a network will meet, in smaller numbers."""
+"""Kinds of surfaces by name: mostly diffuse ones, which are cheap to render, and fewer of all others."""
 
 TEXEL_PX: Range = (0.9, 2.2)
-"""Image pixels that one texture pixel covers where the surface is seen: below 1 detail aliases, far above
-it smears."""
+"""Image pixels that one texture pixel covers where the surface is seen: below 1, detail aliases; far above 1,
+it blurs."""
 
 
 def sample_texture(rng: np.random.Generator, size: int) -> Texture:
@@ -46,16 +48,35 @@ def sample_texture(rng: np.random.Generator, size: int) -> Texture:
     return choose(rng, kinds, [kind.popularity for kind in kinds]).sample(rng, size)
 
 
+def tiled(texture: Texture, tile_m: float) -> Material:
+    """A matte material whose texture spans `tile_m` units of texture coordinates, metres on metric shapes."""
+    return Material(texture, repeats=1.0 / tile_m)
+
+
+def plain(color: Srgb, *, roughness: float = 1.0, specular: float = 0.0, metallic: float = 0.0) -> Material:
+    """A material of one colour; the scalars are those of `Material`."""
+    return Material(SolidColor(color), roughness=roughness, specular=specular, metallic=metallic)
+
+
+def texture_repeats(rng: np.random.Generator, unit_px: float, size: int, texel_px: Range) -> float:
+    """How often a texture of `size` pixels must repeat over a unit of texture coordinates (`Material.repeats`).
+
+    The unit spans `unit_px` image pixels; one texture pixel then covers a number of them from `texel_px`.
+    """
+    return unit_px / (size * log_uniform(rng, *texel_px))
+
+
 def sample_material(rng: np.random.Generator, unit_px: float, texture_size: int = 256) -> Material:
     """A random material for a surface on which one unit of texture coordinates spans `unit_px` pixels.
 
-    The texture is repeated so that its pixels and the image's are of about the same size (`TEXEL_PX`).
+    The texture, `texture_size` pixels wide, is repeated so that its pixels and the image's are of about the
+    same size (`TEXEL_PX`).
     """
     finish = choose(rng, list(FINISHES.values()), [finish.share for finish in FINISHES.values()])
-    texel_px = log_uniform(rng, *TEXEL_PX)
+    repeats = texture_repeats(rng, unit_px, texture_size, TEXEL_PX)
     return Material(
         color=sample_texture(rng, texture_size),
-        repeats=unit_px / (texture_size * texel_px),
+        repeats=repeats,
         roughness=uniform(rng, *finish.roughness),
         specular=uniform(rng, *finish.specular),
         metallic=uniform(rng, *finish.metallic),

@@ -1,8 +1,8 @@
-"""What the texture generators share: palettes, periodic noise, colouring and film grain.
+"""Painting tools of the textures: palettes, periodic noise, colouring, film grain.
 
-Pictures are painted as float32 (3, H, W) in 0..255 (sRGB), fields as float32 (H, W) of unit variance or in
-0..1; channels come first because numpy multiplies pictures by fields many times faster that way. Everything
-is periodic, because materials repeat their textures.
+Pictures are float32 (3, H, W) in 0..255 (sRGB), fields are float32 (H, W), of unit variance or in 0..1.
+Channels come first because numpy multiplies pictures by fields many times faster that way. All are periodic,
+because materials repeat their textures.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ Picture = NDArray[np.float32]
 Srgb = tuple[int, int, int]
 """0..255."""
 Palette = tuple[Srgb, ...]
+"""The colours of a pattern."""
 
 _OKLAB_TO_LMS = np.array(
     [
@@ -94,8 +95,8 @@ def spectral_noise(
 ) -> Field:
     """Periodic Gaussian noise of zero mean and unit variance with amplitude spectrum 1 / f^slope.
 
-    f is in cycles per picture between `low_cycles` and `high_cycles`. `stretch` (along x, along y) draws the
-    pattern out. Photographs have a slope of about 1 (Field 1987).
+    f is in cycles per picture between `low_cycles` and `high_cycles`. `stretch` (along x, along y) elongates
+    the pattern. Photographs have a slope of about 1 (Field 1987).
     """
     height, width = (size, size) if isinstance(size, int) else size
     gain = _spectral_gain(height, width, slope, low_cycles, high_cycles, stretch)
@@ -124,7 +125,7 @@ def _spectral_gain(
 
 
 def to_unit(noise: Field) -> Field:
-    """Unit-variance noise to 0..1, squeezed softly at the ends."""
+    """Noise of unit variance mapped to 0..1, softly clipped at both ends."""
     return 0.5 + 0.5 * np.tanh(np.float32(0.75) * noise)
 
 
@@ -134,7 +135,7 @@ def paint(color: Srgb) -> Picture:
 
 
 def colorize(value: Field, palette: Palette) -> Picture:
-    """Map 0..1 (clipped) onto a palette, blending neighbours."""
+    """A field in 0..1 (clipped) as a picture: the palette from its first to its last colour, blended linearly."""
     stops = np.linspace(0.0, 1.0, len(palette))
     fine = np.linspace(0.0, 1.0, 512)
     table = np.array([np.interp(fine, stops, [color[c] for color in palette]) for c in range(3)], np.float32)
@@ -143,34 +144,34 @@ def colorize(value: Field, palette: Palette) -> Picture:
 
 
 def flat_colors(index: NDArray[np.integer[Any]], colors: Palette | NDArray[np.float32]) -> Picture:
-    """Look up (H, W) indices among colours (N, 3)."""
+    """The picture of (H, W) indices among colours (N, 3)."""
     table = np.ascontiguousarray(np.array(colors, np.float32).T)
     return np.take(table, index, axis=1)
 
 
 def fraction(value: NDArray[Any]) -> Field:
-    """What `value % 1` is, many times faster."""
+    """`value % 1`, many times faster."""
     part: Field = kernels.fraction(value)
     return part
 
 
 def smooth_step(value: Field, edge: float, width: float) -> Field:
-    """0 below `edge`, 1 above, with a ramp of `width`: edges without stairs."""
+    """0 below `edge`, 1 above it, with a cubic ramp of `width` between, so that edges are antialiased."""
     stepped: Field = kernels.smooth_stepped(value, np.float32(edge), np.float32(width))
     return stepped
 
 
 def mix(below: Picture, above: Picture, cover: Field) -> Picture:
-    """`above` painted over `below` with an opacity (H, W)."""
+    """`above` painted over `below` with an opacity `cover` (H, W), 0..1."""
     painted: Picture = kernels.blended(below, above, cover)
     return painted
 
 
 def finish(picture: Picture, rng: np.random.Generator, grain: float) -> NDArray[np.uint8]:
-    """Add fine detail and round to bytes, (H, W, 3).
+    """Add grain and round to bytes, (H, W, 3).
 
-    `grain` is the standard deviation of the noise relative to the brightness: detail at the scale of one
-    and two pixels, which is what stereo matching lives on where a pattern has none.
+    `grain` is the standard deviation of the noise relative to the brightness. It has
+    the scale of one and two pixels: detail to match where a pattern has none.
     """
     fine = (rng.random(picture.shape[1:], np.float32) - np.float32(0.5)) * np.float32(np.sqrt(12.0))
     pixels: NDArray[np.uint8] = kernels.grained(
@@ -180,7 +181,7 @@ def finish(picture: Picture, rng: np.random.Generator, grain: float) -> NDArray[
 
 
 def to_bytes(picture: Picture) -> NDArray[np.uint8]:
-    """Round to (H, W, 3) uint8."""
+    """Round a picture to bytes, (H, W, 3)."""
     pixels: NDArray[np.uint8] = kernels.to_bytes(np.ascontiguousarray(picture))
     return pixels
 

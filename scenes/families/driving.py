@@ -1,6 +1,6 @@
-"""Drives through streets, as in the Driving set (Mayer et al. 2016) and KITTI.
+"""Drives through streets, after the Driving set (Mayer et al. 2016) and KITTI.
 
-A street winds between houses, gardens or parks; a stereo rig drives along one of its lanes, forwards or
+A stereo rig drives along a lane of a street that winds between houses, gardens or parks, forwards or
 backwards, fast or slow, among other vehicles, parked cars and people on the pavements.
 
 The disparity of the road at the lower edge of a 16:9 image is about 0.28 * baseline / camera height as a share
@@ -42,7 +42,7 @@ def sample_driving(rng: np.random.Generator, config: DrivingConfig) -> Scene:
     sides = _sample_sides(rng, config, drive)
     scene = Assembly()
     ground = lay_ground(rng, scene, config, drive, sides)
-    underfoot = len(scene.things)
+    underfoot = len(scene.groups)
     pavements = (Pavement(sides[0]), Pavement(sides[1]))
     fleet = sample_fleet(rng, scene, config, daylight.dusk)
     add_moving(rng, scene, config, drive, fleet)
@@ -58,13 +58,19 @@ def sample_driving(rng: np.random.Generator, config: DrivingConfig) -> Scene:
         add_furniture(rng, scene, config, drive, pavement, ground.pavement_m)
         add_people(rng, scene, config, drive, pavement, ground.pavement_m)
     add_skyline(rng, scene, drive.course, sides)
-    standing = keep_clear(scene.things[underfoot:], camera, config)
+    kept = keep_clear(
+        scene.groups[underfoot:],
+        camera,
+        config.frames,
+        clearance_m=config.clearance_m,
+        nearest_m=camera.disparity_metres / (config.largest_disparity_share * config.width),
+    )
     lights: tuple[Light, ...] = (*daylight.suns, *lamps)
     return Scene(
         family="driving",
         frames=config.frames,
         camera=camera,
-        objects=tuple(item for thing in (*scene.things[:underfoot], *standing) for item in thing),
+        objects=tuple(item for thing in (*scene.groups[:underfoot], *kept) for item in thing),
         materials=tuple(scene.materials),
         lights=lights,
         world=daylight.world,

@@ -1,7 +1,7 @@
-"""Things flying in front of a cluttered landscape: the recipe of FlyingThings3D (Mayer et al. 2016).
+"""Things flying in front of a cluttered landscape, after FlyingThings3D (Mayer et al. 2016).
 
-A large textured ground, static objects standing about on it, and in front of them objects that fly on smooth
-paths, all seen by a moving stereo camera. Every length scales with the nearest allowed depth, so the images
+Static objects stand on a large textured ground; in front of them other objects fly on smooth paths. A moving
+stereo camera sees them all. Every length scales with the nearest allowed depth, so the images
 of a rig with a small baseline look like those of one with a large baseline.
 """
 
@@ -18,6 +18,9 @@ from scenes.appearance.lights import sample_area_light, sample_sun
 from scenes.appearance.materials import sample_material
 from scenes.family import Family, FamilyConfig, crowd_share
 from scenes.motion.trajectories import exposure_times, quaternion, shifted, vector, wander
+from scenes.placement.assembly import Assembly
+from scenes.placement.ground import ground_object
+from scenes.placement.view import View
 from scenes.random_draws import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.shapes import SHAPES
 from scenes.shapes.solids.organic import Terrain
@@ -37,16 +40,20 @@ from scenes.spec import (
 )
 from scenes.textures.sky import Sky
 from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture
+from stereoforge_kit.errors import InputError
 
 _SHAPE_FILL = 1.8
-"""Mean projected area of the shapes, in squares of their half extent; measured over 300 draws."""
+"""Mean projected area of the shapes, in squares of their half extents; measured over 300 draws."""
 _REACH = 1.35
 """Distance from a shape's centre to its farthest point, in half extents, which one in ten exceeds."""
 
 
 @dataclass(frozen=True)
 class FlyingThingsConfig(FamilyConfig):
-    """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+    """Values are drawn uniformly from the ranges, once for each scene or once for each object, as the fields say.
+
+    Raises ValueError for ranges from which no scene can be sampled.
+    """
 
     depths_for_range = True
 
@@ -59,7 +66,7 @@ class FlyingThingsConfig(FamilyConfig):
     focal_mm: Range = (35.0, 35.0)
     """Focal length on a sensor 32 mm wide."""
     baseline_m: Range = (1.0, 1.0)
-    """Distance between the eyes."""
+    """Distance between the cameras."""
     disparity_share: Range = (0.002, 0.167)
     """Disparity of the farthest and the nearest surface, as a share of the image width: 2 to 160 px at 960."""
     background_disparity_share: Range = (0.005, 0.04)
@@ -77,7 +84,7 @@ class FlyingThingsConfig(FamilyConfig):
     pitch_deg: Range = (-2.0, 12.0)
     """How far the camera looks down."""
     roll_deg: Range = (-4.0, 4.0)
-    """How far the camera leans."""
+    """Roll of the camera."""
     suns: Count = (1, 2)
     area_lights: Count = (0, 4)
     sky_strength: Range = (0.7, 1.8)
@@ -88,9 +95,9 @@ class FlyingThingsConfig(FamilyConfig):
     """Diameter of the final pass's blur of the horizon, as a share of the image width."""
 
     user_share: float = 0.5
-    """Share of the flying objects, of their textures and of the skies that are the user's own, where given."""
+    """Share of the flying objects, of their textures and of the skies that are user assets, where there are any."""
     assets: AssetPool = field(default_factory=AssetPool)
-    """The user's own files; filled in from the recipe's, for each split its own."""
+    """The user assets of the split; `with_assets` fills them in."""
     complexity: float = 1.0
     """0 few things of plain shapes, 1 as many and as complicated as the other ranges say."""
 
@@ -98,17 +105,20 @@ class FlyingThingsConfig(FamilyConfig):
         return replace(self, assets=assets)
 
     def within_disparities(self, least_px: float, greatest_px: float) -> FlyingThingsConfig:
-        """The background stands where it did between farthest and nearest, on a logarithmic scale."""
+        """This config for a range of disparities, pixels; the background keeps its share of the logarithmic range.
+
+        Raises ValueError for a least disparity that is not above 0.
+        """
         if least_px <= 0:
-            raise ValueError(f"flying_things need a least disparity above 0, got {least_px:g}")
+            raise InputError(f"flying_things need a least disparity above 0, got {least_px:g}")
         low, high = self.disparity_share
         least, greatest = least_px / self.width, greatest_px / self.width
         stretch = math.log(greatest / least) / math.log(high / low)
         near, far = (least * (share / low) ** stretch for share in self.background_disparity_share)
         return replace(self, disparity_share=(least, greatest), background_disparity_share=(near, far))
 
-    def draws_own(self, rng: np.random.Generator, among: tuple[Asset, ...]) -> Asset | None:
-        """One of the user's files of a kind, or None for one of the generator's own; draws only if there are any."""
+    def draw_user_asset(self, rng: np.random.Generator, among: tuple[Asset, ...]) -> Asset | None:
+        """One of the user's files, or None for a procedural one; draws from `rng` only if there are any files."""
         return choose(rng, among) if among and chance(rng, self.user_share) else None
 
     def at_complexity(self, complexity: float) -> FlyingThingsConfig:
@@ -122,20 +132,17 @@ class FlyingThingsConfig(FamilyConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 <= self.complexity <= 1:
-            raise ValueError(f"flying_things: complexity must be from 0 to 1, got {self.complexity}")
+            raise InputError(f"flying_things: complexity must be from 0 to 1, got {self.complexity}")
         for name in ("focal_mm", "baseline_m", "disparity_share", "background_disparity_share"):
             if getattr(self, name)[0] <= 0:
-                raise ValueError(f"flying_things: {name} must be above 0, got {getattr(self, name)}")
+                raise InputError(f"flying_things: {name} must be above 0, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
-class _Rig:
-    """The camera and what placing things in its view needs."""
+class _Rig(View):
+    """The view, and the depths between which things are placed in it."""
 
-    camera: StereoCamera
     config: FlyingThingsConfig
-    pose: NDArray[np.float64]
-    """Left eye to world, half way through the scene."""
 
     def depth(self, disparity_share: float) -> float:
         """Depth in metres at which the disparity is this share of the image width."""
@@ -143,31 +150,20 @@ class _Rig:
 
     @property
     def nearest_m(self) -> float:
+        """Least depth allowed."""
         return self.depth(self.config.disparity_share[1])
 
     @property
     def farthest_m(self) -> float:
+        """Depth of the farthest ground."""
         return self.depth(self.config.disparity_share[0])
-
-    @property
-    def half_view(self) -> tuple[float, float]:
-        """Tangents of half the horizontal and half the vertical field of view."""
-        focal_px = self.camera.focal_px
-        return self.camera.width / 2 / focal_px, self.camera.height / 2 / focal_px
-
-    def point(self, right: float, up: float, depth_m: float) -> NDArray[np.float64]:
-        """World point at an image position (-1..1 is the frame, seen from between the eyes) and depth."""
-        across, high = self.half_view
-        local = (right * across * depth_m + self.camera.baseline_m / 2, up * high * depth_m, -depth_m)
-        world: NDArray[np.float64] = self.pose[:3, :3] @ local + self.pose[:3, 3]
-        return world
 
 
 @dataclass(frozen=True)
 class _Land:
-    """The ground and where it lies in the world."""
+    """Rolling ground (`scenes.placement.ground.Ground`)."""
 
-    terrain: Terrain
+    shape: Terrain
     half_m: float
     """Half its side."""
     level_m: float
@@ -175,24 +171,29 @@ class _Land:
 
     def height_m(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """World z of the ground at (N, 2) world points."""
-        height: NDArray[np.float64] = self.level_m + self.half_m * self.terrain.height(points_m / self.half_m)
+        height: NDArray[np.float64] = self.level_m + self.half_m * self.shape.height(points_m / self.half_m)
         return height
+
+    def mesh_origin_m(self) -> float:
+        """World z of the origin of the mesh."""
+        return self.level_m - self.shape.middle_height() * self.half_m
 
 
 def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -> Scene:
     """Draw one scene."""
     rig = _sample_rig(rng, config)
     land = _sample_land(rng, rig)
-    materials: list[Material] = []
-    ground = _ground(rng, rig, land, materials)
-    background = _background(rng, rig, land, materials)
-    flyers = _flyers(rng, rig, land, materials)
+    scene = Assembly()
+    scene.add(_ground(rng, rig, land, scene))
+    background = _background(rng, rig, land, scene)
+    flyers = _flyers(rng, rig, land, scene)
+    scene.add(*background, *flyers)
     return Scene(
         family="flying_things",
         frames=config.frames,
         camera=rig.camera,
-        objects=(ground, *background, *flyers),
-        materials=tuple(materials),
+        objects=scene.objects,
+        materials=tuple(scene.materials),
         lights=_lights(rng, rig),
         world=World(_environment(rng, config), uniform(rng, *config.sky_strength)),
         exposure_key=uniform(rng, 0.18, 0.32),
@@ -219,7 +220,7 @@ def _sample_rig(rng: np.random.Generator, config: FlyingThingsConfig) -> _Rig:
         reach_deg=4.0,
     )
     camera = StereoCamera(config.width, config.height, focal_mm, baseline_m, motion)
-    return _Rig(camera, config, camera.pose("left", (config.frames - 1) / 2))
+    return _Rig(camera, config.frames, config)
 
 
 def _final(rng: np.random.Generator, rig: _Rig) -> FinalPass:
@@ -234,7 +235,7 @@ def _final(rng: np.random.Generator, rig: _Rig) -> FinalPass:
 
 
 def _sample_land(rng: np.random.Generator, rig: _Rig) -> _Land:
-    """Gently rolling land, below everything the lower edge of the image may show nearer than allowed."""
+    """Gently rolling land, so low that the image's lower edge shows none of it nearer than allowed."""
     half_m = rig.farthest_m
     terrain = Terrain(
         relief=uniform(rng, 0.0005, 0.006),
@@ -255,19 +256,16 @@ def _sample_land(rng: np.random.Generator, rig: _Rig) -> _Land:
     return _Land(terrain, half_m, -below_m)
 
 
-def _ground(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]) -> SceneObject:
+def _ground(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -> SceneObject:
     # Its texture is sharp where the ground is at a few times the nearest depth.
     unit_px = land.half_m * rig.camera.focal_px / (3 * rig.nearest_m)
-    materials.append(sample_material(rng, unit_px, 512))
-    motion = Trajectory.static((0.0, 0.0, land.level_m - land.terrain.middle_height() * land.half_m))
-    scale = (land.half_m, land.half_m, land.half_m)
-    return SceneObject("ground", land.terrain, len(materials) - 1, motion, scale)
+    return ground_object(land, scene.material(sample_material(rng, unit_px, 512)))
 
 
-_STANDING: dict[str, float] = {"Box": 0.3, "DeformedCylinder": 0.2, "Cylinder": 0.08}
-"""Shares of the background's plain kinds; the rest is of any kind."""
-_PLAIN: dict[str, float] = {"Box": 0.4, "Cylinder": 0.3, "Superquadric": 0.3}
-"""What all flying objects are at complexity 0, fewer and fewer up to 1."""
+_BACKGROUND_SHAPES: dict[str, float] = {"Box": 0.3, "DeformedCylinder": 0.2, "Cylinder": 0.08}
+"""Shares of these kinds among the background's shapes; the rest is of any kind."""
+_PLAIN_SHAPES: dict[str, float] = {"Box": 0.4, "Cylinder": 0.3, "Superquadric": 0.3}
+"""Kinds of all flying objects at complexity 0; their share falls to none at complexity 1."""
 
 
 def _sample_shape(rng: np.random.Generator, plain: dict[str, float] | None = None) -> Shape:
@@ -281,13 +279,10 @@ def _sample_shape(rng: np.random.Generator, plain: dict[str, float] | None = Non
     return choose(rng, kinds, [kind.popularity for kind in kinds]).sample(rng)
 
 
-def _background(
-    rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]
-) -> list[SceneObject]:
+def _background(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -> list[SceneObject]:
     """Objects standing or lying on the ground in view, near ones small, far ones up to skyline size."""
-    first = len(materials)
     kinds = rig.config.count(rng, rig.config.background_materials)
-    materials.extend(sample_material(rng, 0.08 * rig.camera.width) for _ in range(kinds))
+    materials = [scene.material(sample_material(rng, 0.08 * rig.camera.width)) for _ in range(kinds)]
     count = rig.config.count(rng, rig.config.background_objects)
     depths_m = [rig.depth(uniform(rng, *rig.config.background_disparity_share)) for _ in range(count)]
     spots = np.array([rig.point(uniform(rng, -1.25, 1.25), 0.0, depth_m) for depth_m in depths_m])
@@ -302,8 +297,8 @@ def _background(
         things.append(
             SceneObject(
                 name=f"background {index}",
-                shape=_sample_shape(rng, _STANDING),
-                material=integer(rng, first, len(materials) - 1),
+                shape=_sample_shape(rng, _BACKGROUND_SHAPES),
+                material=choose(rng, materials),
                 motion=Trajectory.static(vector(spot + sunk), quaternion(turn)),
                 scale_m=vector(size_m * rng.uniform(0.75, 1.25, 3)),
             )
@@ -311,7 +306,7 @@ def _background(
     return things
 
 
-def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Material]) -> list[SceneObject]:
+def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -> list[SceneObject]:
     count = rig.config.count(rng, rig.config.flying_objects)
     # `count` objects of this cover each leave 1 - flying_cover of the image free, if placed independently.
     each = 1 - (1 - uniform(rng, *rig.config.flying_cover)) ** (1 / max(count, 1))
@@ -319,20 +314,20 @@ def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, materials: list[Ma
     for index in range(count):
         cover = min(each * math.exp(rng.normal(-0.1, 0.5)), 0.12)
         size_px = math.sqrt(cover * rig.camera.width * rig.camera.height / _SHAPE_FILL)
-        materials.append(_flyer_material(rng, rig.config, size_px))
-        flyers.append(_flyer(rng, rig, f"flying {index}", len(materials) - 1, size_px, land.level_m))
+        material = scene.material(_flyer_material(rng, rig.config, size_px))
+        flyers.append(_flyer(rng, rig, f"flying {index}", material, size_px, land.level_m))
     return flyers
 
 
 def _flyer_material(rng: np.random.Generator, config: FlyingThingsConfig, size_px: float) -> Material:
     material = sample_material(rng, size_px)
-    own = config.draws_own(rng, config.assets.textures)
+    own = config.draw_user_asset(rng, config.assets.textures)
     return material if own is None else replace(material, color=UserTexture(own.sha256))
 
 
 def _environment(rng: np.random.Generator, config: FlyingThingsConfig) -> Texture:
     sky = Sky.sample(rng, 1024)
-    own = config.draws_own(rng, config.assets.environments)
+    own = config.draw_user_asset(rng, config.assets.environments)
     return sky if own is None else UserEnvironment(own.sha256)
 
 
@@ -341,8 +336,10 @@ def _flyer(
 ) -> SceneObject:
     """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth."""
     config = rig.config
-    shape = _sample_shape(rng, {name: share * (1 - config.complexity) for name, share in _PLAIN.items()})
-    if own := config.draws_own(rng, config.assets.meshes):
+    shape = _sample_shape(
+        rng, {name: share * (1 - config.complexity) for name, share in _PLAIN_SHAPES.items()}
+    )
+    if own := config.draw_user_asset(rng, config.assets.meshes):
         shape = UserMesh(own.sha256)
     stretch = rng.uniform(0.8, 1.25, 3)
     near_share = config.disparity_share[1]
@@ -369,13 +366,13 @@ def _flyer(
 
 
 def _kept_away(motion: Trajectory, reach_m: float, rig: _Rig) -> Trajectory:
-    """The motion, moved away from the camera as far as it takes to stay behind the nearest depth."""
+    """The motion, moved away from the camera so far that the object stays behind the nearest depth."""
     forward = -rig.pose[:3, 2]
     shortfall = -math.inf
     for time in exposure_times(rig.config.frames):
-        eye = rig.camera.pose("left", time)
-        depth_m = float((motion.pose(time)[:3, 3] - eye[:3, 3]) @ -eye[:3, 2])
-        shortfall = max(shortfall, (rig.nearest_m + reach_m - depth_m) / float(forward @ -eye[:3, 2]))
+        camera = rig.camera.pose("left", time)
+        depth_m = float((motion.pose(time)[:3, 3] - camera[:3, 3]) @ -camera[:3, 2])
+        shortfall = max(shortfall, (rig.nearest_m + reach_m - depth_m) / float(forward @ -camera[:3, 2]))
     return motion if shortfall <= 0 else shifted(motion, forward * shortfall * 1.001)
 
 

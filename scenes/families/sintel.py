@@ -1,8 +1,9 @@
-"""Figures in wide landscapes: the world of MPI Sintel (Butler et al. 2012), with figures of our own.
+"""Characters in wide landscapes, after MPI Sintel (Butler et al. 2012), with procedural characters.
 
-Robed or booted people, now and then with a beast, in mountains, snow, desert, a bamboo forest, a small
-town or among ruins; eroded land up to the horizon; fog, motion blur and defocus in the final pass. Lengths
-are metres, a person being about 1.75 m tall; the distance follows from how large the person is to appear.
+People in robes or boots, some with an animal, stand or walk in mountains, snow, desert, a bamboo forest, a
+small town or among ruins. Eroded land reaches to the horizon; the final pass has fog, motion blur and
+defocus. Lengths are metres, a person is about 1.75 m tall; the distance follows from how large the main
+person shall appear.
 """
 
 from __future__ import annotations
@@ -12,15 +13,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.appearance.lights import sample_area_light, sample_sun
 from scenes.appearance.material_textures import (
-    BY_NAME,
+    CHARACTER_TEXTURES,
     DESERT_ROCK,
     SNOWY,
-    Stuff,
+    TextureSampler,
     culm,
     grains,
     ground,
@@ -33,7 +33,7 @@ from scenes.appearance.material_textures import (
 )
 from scenes.appearance.palettes import DRY_GRASS, EARTH, HEATH, MOSS, RED_ROCK, ROCK, SAND, SNOW
 from scenes.family import Family
-from scenes.landscapes.characters import Coat, Figure, sample_creature
+from scenes.landscapes.characters import Character, Coat, place_character, sample_creature
 from scenes.landscapes.people import sample_person, statue
 from scenes.landscapes.terrain import (
     Land,
@@ -44,8 +44,8 @@ from scenes.landscapes.terrain import (
     sample_final,
     sample_focus,
 )
-from scenes.landscapes.vegetation import Garden, boulders, grass, plants, trees, undergrowth
-from scenes.placement.stage import Spot, Stage
+from scenes.landscapes.vegetation import VegetationArea, boulders, grass, plants, trees, undergrowth
+from scenes.placement.ground import GroundPlacement, Spot
 from scenes.random_draws import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.shapes.nature.landforms import Landscape
 from scenes.shapes.nature.masonry import Archway, BlockWall, Column, House, Steps
@@ -55,18 +55,22 @@ from scenes.textures.sky import Sky
 from scenes.user_assets.replacement import Replaceable
 
 PERSON_M = 1.75
+"""Height of a person."""
 
 
 @dataclass(frozen=True)
 class SintelConfig(LandscapeConfig):
-    """Ranges are drawn from uniformly, once a scene or once an object as the words say."""
+    """Values are drawn uniformly from the ranges, once for each scene or once for each object, as the fields say.
+
+    Raises ValueError for ranges from which no scene can be sampled.
+    """
 
     crowd = ("people", "trees", "structures", "boulders", "plants")
 
     focal_mm: Range = (26.0, 60.0)
     """Focal length on a sensor 32 mm wide."""
     focus_disparity_share: Range = (0.01, 0.036)
-    """Disparity of the person the scene is about, as a share of the image width (0.01 is 10 px at 960);
+    """Disparity of the main person, as a share of the image width (0.01 is 10 px at 960);
     it sets the baseline."""
     focus_height_share: Range = (0.35, 0.8)
     """Height of that person, as a share of the image height."""
@@ -75,7 +79,7 @@ class SintelConfig(LandscapeConfig):
     fog_share: float = 0.6
     """Share of the scenes with fog in the final pass, 0..1."""
     people: Count = (1, 4)
-    """People per scene; the first is what the scene is about."""
+    """People per scene; the first is the main one, at which the camera looks."""
     beast_share: float = 0.3
     """Share of the scenes with an animal beside the people, 0..1."""
     trees: Count = (14, 30)
@@ -95,9 +99,9 @@ class _Place:
     """A kind of landscape."""
 
     share: float
-    """How many of all scenes are such, relative to the others."""
-    floor: Stuff
-    stones: Stuff
+    """How many scenes are of this kind, relative to the others."""
+    floor: TextureSampler
+    stones: TextureSampler
     relief: Range
     """Height of the outermost hills, relative to half the land's side."""
     ridged: Range
@@ -105,42 +109,42 @@ class _Place:
     clearing: Range
     """Radius of the level middle, relative to half the land's side."""
     rockiness: float
-    """Share of the configured number of rocks that lie about."""
+    """Share of the configured number of rocks that this kind of landscape has."""
     furnish: Callable[[np.random.Generator, SintelConfig, _Plan], None]
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """What is decided before anything is placed."""
+    """Decisions that come before anything is placed."""
 
     name: str
     place: _Place
     depth_m: float
-    """Of the person the scene is about."""
-    stage: Stage
+    """Depth of the main person."""
+    placement: GroundPlacement
 
     @property
-    def garden(self) -> Garden:
-        return Garden(self.stage, self.depth_m)
+    def area(self) -> VegetationArea:
+        return VegetationArea(self.placement, self.depth_m)
 
 
 def sample_sintel(rng: np.random.Generator, config: SintelConfig) -> Scene:
     """Draw one scene."""
     plan = _sample_plan(rng, config)
-    stage, depth_m = plan.stage, plan.depth_m
+    placement, depth_m = plan.placement, plan.depth_m
     sky = Sky.sample(rng, 1024)
-    stage.ground(rng, plan.place.floor, 1.5 * depth_m)
+    placement.lay_ground(rng, plan.place.floor, 1.5 * depth_m)
     people = _people(rng, config, plan)
     plan.place.furnish(rng, config, plan)
     stones = (plan.place.stones, plan.place.stones)
     rocks = round(plan.place.rockiness * integer(rng, *config.boulders))
-    boulders(rng, plan.garden, "rock", rocks, stones, (0.8, 9.0), (0.025, 0.16))
+    boulders(rng, plan.area, "rock", rocks, stones, (0.8, 9.0), (0.025, 0.16))
     crags = round(plan.place.rockiness * integer(rng, 4, 9))
-    boulders(rng, plan.garden, "crag", crags, stones, (9.0, 30.0), (0.3, 1.3), (0.4, 0.8))
+    boulders(rng, plan.area, "crag", crags, stones, (9.0, 30.0), (0.3, 1.3), (0.4, 0.8))
     base = Scene(
         family="sintel",
         frames=config.frames,
-        camera=stage.camera,
+        camera=placement.view.camera,
         objects=(),
         materials=(),
         lights=_lights(rng, config, plan),
@@ -151,7 +155,7 @@ def sample_sintel(rng: np.random.Generator, config: SintelConfig) -> Scene:
         ),
         notes={"people": float(people), "place": float(sorted(_PLACES).index(plan.name))},
     )
-    return stage.scene(base)
+    return placement.scene(base)
 
 
 def _sample_plan(rng: np.random.Generator, config: SintelConfig) -> _Plan:
@@ -162,7 +166,7 @@ def _sample_plan(rng: np.random.Generator, config: SintelConfig) -> _Plan:
     land = _sample_land(rng, place, depth_m)
     focus = sample_focus(rng, config, focal_mm, depth_m, PERSON_M, uniform(rng, 0.5, 1.3) * PERSON_M)
     camera = sample_camera(rng, config.width, config.height, config.frames, land, focus)
-    return _Plan(name, place, depth_m, Stage(land, camera, config.frames, 1.15 * focus.nearest_m))
+    return _Plan(name, place, depth_m, GroundPlacement(land, camera, config.frames, 1.15 * focus.nearest_m))
 
 
 def _sample_land(rng: np.random.Generator, place: _Place, depth_m: float) -> Land:
@@ -181,61 +185,61 @@ def _sample_land(rng: np.random.Generator, place: _Place, depth_m: float) -> Lan
 
 
 def _people(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> int:
-    """The one the scene is about, others about it, sometimes a beast; returns how many people there are."""
-    stage, d = plan.stage, plan.depth_m
+    """The main person, others about them, sometimes an animal; returns how many people were placed."""
+    placement, d = plan.placement, plan.depth_m
     placed = 0
     for index in range(integer(rng, *config.people)):
-        figure = sample_person(rng, 52 if index == 0 else 38)
+        character = sample_person(rng, 52 if index == 0 else 38)
         scale_m = PERSON_M * uniform(rng, 0.92, 1.06)
         right = uniform(rng, -0.45, 0.45)
         # Mostly seen from the front or the side, now and then from behind.
         heading = -math.pi / 2 + uniform(rng, -2.2, 2.2)
-        spot = stage.spot(right, d, heading)
+        spot = placement.spot(right, d, heading)
         if index > 0:
-            spot = stage.spot(uniform(rng, -0.9, 0.9), d * log_uniform(rng, 0.9, 3.5), heading)
-        placed += _dressed(rng, stage, f"person {index}", figure, spot, scale_m, checked=index > 0)
+            spot = placement.spot(uniform(rng, -0.9, 0.9), d * log_uniform(rng, 0.9, 3.5), heading)
+        placed += _dressed(rng, placement, f"person {index}", character, spot, scale_m, checked=index > 0)
         if index == 0:
-            stage.keep_free(right, 0.5 * scale_m / (d * stage.half_view[0]), d)
+            placement.keep_view_free(right, 0.5 * scale_m / (d * placement.view.half_view[0]), d)
     if chance(rng, config.beast_share):
-        figure = sample_creature(rng, Coat(integer(rng, 0, 1500), 0.03, 48))
-        spot = stage.spot(uniform(rng, -0.9, 0.9), d * log_uniform(rng, 1.0, 2.5), uniform(rng, 0.0, 6.3))
-        _dressed(rng, stage, "beast", figure, spot, uniform(rng, 0.8, 2.0), checked=True)
+        character = sample_creature(rng, Coat(integer(rng, 0, 1500), 0.03, 48))
+        spot = placement.spot(uniform(rng, -0.9, 0.9), d * log_uniform(rng, 1.0, 2.5), uniform(rng, 0.0, 6.3))
+        _dressed(rng, placement, "beast", character, spot, uniform(rng, 0.8, 2.0), checked=True)
     return placed
 
 
 def _dressed(
     rng: np.random.Generator,
-    stage: Stage,
+    placement: GroundPlacement,
     name: str,
-    figure: Figure,
+    character: Character,
     spot: Spot,
     scale_m: float,
     *,
     checked: bool,
 ) -> bool:
-    """Put a figure on the stage in materials of its own."""
-    stuffs = {part.stuff for part in figure.parts}
-    worn = {
-        stuff: stage.wear(
+    """Put a character on the ground in materials of its own."""
+    names = {part.material for part in character.parts}
+    materials = {
+        material: placement.new_material(
             rng,
-            BY_NAME[stuff],
-            (0.5 if stuff in ("cloth", "fur") else 0.2) * scale_m,
+            CHARACTER_TEXTURES[material],
+            (0.5 if material in ("cloth", "fur") else 0.2) * scale_m,
             spot.depth_m,
-            size=256 if stuff in ("cloth", "fur") else 128,
-            gloss=0.5 if stuff == "eye" else 0.0,
+            size=256 if material in ("cloth", "fur") else 128,
+            gloss=0.5 if material == "eye" else 0.0,
         )
-        for stuff in sorted(stuffs)
+        for material in sorted(names)
     }
-    return stage.figure(name, figure, worn, spot, scale_m, checked=checked)
+    return place_character(placement, name, character, materials, spot, scale_m, checked=checked)
 
 
 def _mountain(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
-    garden = plan.garden
+    area = plan.area
     _conifers(rng, config, plan, [leaves(HEATH)] * 2)
     undergrowth(
-        rng, garden, integer(rng, *config.plants) // 2, [leaves(HEATH), leaves(DRY_GRASS)], (0.04, 0.14)
+        rng, area, integer(rng, *config.plants) // 2, [leaves(HEATH), leaves(DRY_GRASS)], (0.04, 0.14)
     )
-    grass(rng, garden, integer(rng, *config.plants), (HEATH, DRY_GRASS), (0.04, 0.12))
+    grass(rng, area, integer(rng, *config.plants), (HEATH, DRY_GRASS), (0.04, 0.12))
 
 
 def _snow(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
@@ -247,25 +251,25 @@ def _snow(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
 
 
 def _desert(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
-    garden = plan.garden
+    area = plan.area
     if chance(rng, 0.7):
         _ruined(rng, plan, integer(rng, *config.structures) // 2, masonry(SAND))
     if chance(rng, 0.6):
         palms = [Palm.sample(rng) for _ in range(2)]
         trees(
             rng,
-            garden,
+            area,
             palms,
             integer(rng, 3, 10),
             (1.5, 8.0),
             (0.25, 0.5),
             [leaves(DRY_GRASS), leaves(HEATH)],
         )
-    grass(rng, garden, integer(rng, *config.plants) // 2, (DRY_GRASS,), (0.04, 0.12))
+    grass(rng, area, integer(rng, *config.plants) // 2, (DRY_GRASS,), (0.04, 0.12))
 
 
 def _bamboo(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
-    garden = plan.garden
+    area = plan.area
     clumps = [
         Bamboo(
             integer(rng, 2, 4),
@@ -279,32 +283,30 @@ def _bamboo(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None
     ]
     count = 2 * integer(rng, *config.trees)
     scales = (7.0 / plan.depth_m, 11.0 / plan.depth_m)
-    plants(
-        rng, garden, "bamboo", clumps, count, (0.9, 9.0), scales, [culm] * 3, sway=(0.005, 0.03), sunk=0.005
-    )
-    undergrowth(rng, garden, integer(rng, *config.plants), [leaves(HEATH)] * 2, (0.04, 0.16))
-    grass(rng, garden, integer(rng, *config.plants) // 2, (HEATH, DRY_GRASS), (0.03, 0.1))
+    plants(rng, area, "bamboo", clumps, count, (0.9, 9.0), scales, [culm] * 3, sway=(0.005, 0.03), sunk=0.005)
+    undergrowth(rng, area, integer(rng, *config.plants), [leaves(HEATH)] * 2, (0.04, 0.16))
+    grass(rng, area, integer(rng, *config.plants) // 2, (HEATH, DRY_GRASS), (0.03, 0.1))
     if chance(rng, 0.5):
         _ruined(rng, plan, 2, masonry(ROCK))
 
 
 def _ruins(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
-    garden, tones = plan.garden, choose(rng, (ROCK, SAND, RED_ROCK))
-    stone, stones = masonry(tones), rock(tones)
+    area, colors = plan.area, choose(rng, (ROCK, SAND, RED_ROCK))
+    stone, stones = masonry(colors), rock(colors)
     _ruined(rng, plan, integer(rng, *config.structures), stone)
     _colonnade(rng, plan, stones)
     if chance(rng, 0.6):
         _bare_trees(rng, plan, integer(rng, 2, 5))
-    undergrowth(rng, garden, integer(rng, *config.plants), [leaves(HEATH), leaves(MOSS)], (0.03, 0.13))
-    grass(rng, garden, integer(rng, *config.plants), (HEATH, DRY_GRASS), (0.03, 0.1))
+    undergrowth(rng, area, integer(rng, *config.plants), [leaves(HEATH), leaves(MOSS)], (0.03, 0.13))
+    grass(rng, area, integer(rng, *config.plants), (HEATH, DRY_GRASS), (0.03, 0.1))
 
 
 def _town(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
     """Houses along both sides of a street that leads away from the camera, a wall or tower at its end."""
-    stage, d = plan.stage, plan.depth_m
+    placement, d = plan.placement, plan.depth_m
     houses = [House.sample(rng) for _ in range(4)]
-    walls = [stage.wear(rng, plaster, 4.0, 2 * d, size=512) for _ in range(4)]
-    roofs = [stage.wear(rng, roofing, 3.0, 2 * d) for _ in range(3)]
+    walls = [placement.new_material(rng, plaster, 4.0, 2 * d, size=512) for _ in range(4)]
+    roofs = [placement.new_material(rng, roofing, 3.0, 2 * d) for _ in range(3)]
     half_street_m = uniform(rng, 2.2, 4.5)
     for side in (-1, 1):
         along_m = uniform(rng, 0.2, 0.8) * d
@@ -316,96 +318,95 @@ def _town(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> None:
             centre = np.array(
                 (side * (half_street_m + across / 2 + uniform(rng, 0.0, 1.0)), along_m + extent / 2)
             )
-            spot = _spot_at(stage, centre, facing + float(rng.normal(0.0, 0.06)))
-            worn = {"walls": choose(rng, walls), "roof": choose(rng, roofs)}
-            stage.stand_in_parts(f"house {side} {index}", shape, worn, spot, width_m, on_lowest=True)
+            spot = placement.spot_at(centre, facing + float(rng.normal(0.0, 0.06)))
+            materials = {"walls": choose(rng, walls), "roof": choose(rng, roofs)}
+            placement.stand_in_parts(f"house {side} {index}", shape, materials, spot, width_m, on_lowest=True)
             along_m += extent * uniform(rng, 1.05, 1.5)
     _ruined(rng, plan, integer(rng, 1, 4), masonry(choose(rng, (ROCK, SAND))), ruin=0.1)
     if chance(rng, 0.6):
         kinds = [replace(Tree.sample(rng), leaves=300)]
-        trees(rng, plan.garden, kinds, integer(rng, 2, 5), (1.3, 8.0), (0.2, 0.35), [leaves(HEATH)])
+        trees(rng, plan.area, kinds, integer(rng, 2, 5), (1.3, 8.0), (0.2, 0.35), [leaves(HEATH)])
 
 
-def _spot_at(stage: Stage, flat_m: NDArray[np.float64], heading_rad: float) -> Spot:
-    height = float(stage.land.height_m(flat_m[None])[0])
-    place = np.array((*flat_m, height))
-    depth = float((stage.pose[:3, 3] - place) @ stage.pose[:3, 2])
-    return Spot(place, depth, heading_rad)
-
-
-def _conifers(rng: np.random.Generator, config: SintelConfig, plan: _Plan, foliage: Sequence[Stuff]) -> None:
+def _conifers(
+    rng: np.random.Generator, config: SintelConfig, plan: _Plan, foliage: Sequence[TextureSampler]
+) -> None:
     kinds = [
         replace(Conifer.sample(rng), whorls=integer(rng, 8, 11), branches=integer(rng, 5, 7))
         for _ in range(3)
     ]
     # A scale of one is a tree of one metre's radius at the foot.
     scales = (0.9 / plan.depth_m, 2.4 / plan.depth_m)
-    trees(rng, plan.garden, kinds, integer(rng, *config.trees), (1.4, 16.0), scales, foliage)
+    trees(rng, plan.area, kinds, integer(rng, *config.trees), (1.4, 16.0), scales, foliage)
 
 
 def _bare_trees(rng: np.random.Generator, plan: _Plan, count: int) -> None:
     kinds = [replace(Tree.sample(rng), leaves=0, crooked=uniform(rng, 0.1, 0.25)) for _ in range(3)]
     scales = (1.2 / plan.depth_m, 3.0 / plan.depth_m)
-    trees(rng, plan.garden, kinds, count, (1.3, 8.0), scales, [leaves(HEATH)])
+    trees(rng, plan.area, kinds, count, (1.3, 8.0), scales, [leaves(HEATH)])
 
 
-def _ruined(rng: np.random.Generator, plan: _Plan, count: int, stone: Stuff, ruin: float = 1.0) -> None:
+def _ruined(
+    rng: np.random.Generator, plan: _Plan, count: int, stone: TextureSampler, ruin: float = 1.0
+) -> None:
     """Walls, towers, arches, steps, columns and a statue, here and there; `ruin` scales their decay."""
-    stage, d = plan.stage, plan.depth_m
-    worn = [stage.wear(rng, stone, 2.0, 1.8 * d, size=512) for _ in range(2)]
-    hewn = stage.wear(rng, plan.place.stones, 2.0, 1.3 * d, size=512)
+    placement, d = plan.placement, plan.depth_m
+    masonry_materials = [placement.new_material(rng, stone, 2.0, 1.8 * d, size=512) for _ in range(2)]
+    hewn = placement.new_material(rng, plan.place.stones, 2.0, 1.3 * d, size=512)
     for index in range(count):
         kind = choose(rng, (BlockWall, Archway, Steps, Column, "statue"), (0.3, 0.25, 0.12, 0.2, 0.13))
-        spot = stage.scatter(rng, (1.1 * d, 7.0 * d), 1.1)
-        material = choose(rng, worn)
+        spot = placement.random_spot(rng, (1.1 * d, 7.0 * d), 1.1)
+        material = choose(rng, masonry_materials)
         name = f"ruin {index}"
         if kind is Archway:
             shape = replace(Archway.sample(rng), seed=new_seed(rng))
             shape = replace(shape, ruin=shape.ruin * ruin)
             facing = replace(spot, heading_rad=float(rng.normal(0.0, 0.5)))
-            stage.stand(name, shape, material, facing, uniform(rng, 2.2, 4.5), on_lowest=True)
+            placement.stand(name, shape, material, facing, uniform(rng, 2.2, 4.5), on_lowest=True)
         elif kind is BlockWall:
             wall = BlockWall.sample(rng)
             wall = replace(wall, ruin=wall.ruin * ruin)
-            stage.stand(name, wall, hewn, spot, uniform(rng, 0.45, 0.8), on_lowest=True)
+            placement.stand(name, wall, hewn, spot, uniform(rng, 0.45, 0.8), on_lowest=True)
         elif kind is Steps:
-            stage.stand(name, Steps.sample(rng), material, spot, uniform(rng, 0.3, 0.45), on_lowest=True)
+            placement.stand(name, Steps.sample(rng), material, spot, uniform(rng, 0.3, 0.45), on_lowest=True)
         elif kind is Column:
-            _column(rng, stage, name, Column.sample(rng), hewn, spot)
+            _column(rng, placement, name, Column.sample(rng), hewn, spot)
         else:
-            _statue(rng, stage, name, hewn, spot)
+            _statue(rng, placement, name, hewn, spot)
 
 
 def _column(
-    rng: np.random.Generator, stage: Stage, name: str, shape: Column, material: int, spot: Spot
+    rng: np.random.Generator, placement: GroundPlacement, name: str, shape: Column, material: int, spot: Spot
 ) -> None:
-    """Standing, or one time in four lying on the ground."""
+    """PartedShape, or one time in four lying on the ground."""
     scale_m = uniform(rng, 3.0, 6.5) / shape.slenderness
     if chance(rng, 0.25):
         fallen = Rotation.from_euler("X", 90.0, degrees=True)
-        stage.stand(name, shape, material, spot, scale_m, sunk_m=-0.6 * scale_m, lean=fallen)
+        placement.stand(name, shape, material, spot, scale_m, sunk_m=-0.6 * scale_m, lean=fallen)
     else:
-        stage.stand(name, shape, material, spot, scale_m, on_lowest=True)
+        placement.stand(name, shape, material, spot, scale_m, on_lowest=True)
 
 
-def _statue(rng: np.random.Generator, stage: Stage, name: str, material: int, spot: Spot) -> None:
+def _statue(
+    rng: np.random.Generator, placement: GroundPlacement, name: str, material: int, spot: Spot
+) -> None:
     """A person of stone on a stepped plinth."""
     scale_m = uniform(rng, 1.6, 3.2)
     plinth = BlockWall(2, 3, 0.5, 2.6, 0.0, 0.0, 0.02, new_seed(rng))
     facing = replace(spot, heading_rad=-math.pi / 2 + float(rng.normal(0.0, 0.6)))
     block_m = 0.3 * scale_m
-    figure = statue(rng, sample_person(rng, 40))
+    character = statue(rng, sample_person(rng, 40))
     body = replace(facing, ground_m=facing.ground_m + np.array((0.0, 0.0, 0.98 * block_m)))
     upright = replace(facing, heading_rad=facing.heading_rad + math.pi / 2)
-    box = stage.box_of(figure, body, scale_m, 0.0, None)
-    if stage.allows(box) and stage.stand(f"{name} plinth", plinth, material, upright, block_m):
-        stage.stand(f"{name} statue", figure, material, body, scale_m, checked=False)
+    box = placement.box_of(character, body, scale_m)
+    if placement.allows(box) and placement.stand(f"{name} plinth", plinth, material, upright, block_m):
+        placement.stand(f"{name} statue", character, material, body, scale_m, checked=False)
 
 
-def _colonnade(rng: np.random.Generator, plan: _Plan, stone: Stuff) -> None:
+def _colonnade(rng: np.random.Generator, plan: _Plan, stone: TextureSampler) -> None:
     """Two rows of columns of one kind, some broken, that lead away from the camera or across the view."""
-    stage, d = plan.stage, plan.depth_m
-    material = stage.wear(rng, stone, 2.0, 1.5 * d)
+    placement, d = plan.placement, plan.depth_m
+    material = placement.new_material(rng, stone, 2.0, 1.5 * d)
     whole = replace(Column.sample(rng), broken=0.0)
     kinds = [whole, *(replace(whole, broken=uniform(rng, 0.2, 0.8), seed=new_seed(rng)) for _ in range(3))]
     height_m, gap_m, row_m = uniform(rng, 3.5, 7.0), uniform(rng, 2.0, 3.5), uniform(rng, 2.5, 5.0)
@@ -413,8 +414,8 @@ def _colonnade(rng: np.random.Generator, plan: _Plan, stone: Stuff) -> None:
     origin = np.array((uniform(rng, -1.0, 1.0), uniform(rng, 0.9, 1.6) * d))
     for index in range(integer(rng, 8, 16)):
         flat = origin + turn @ np.array(((index % 2 - 0.5) * 2 * row_m, index // 2 * gap_m))
-        spot = _spot_at(stage, flat, 0.0)
-        stage.stand(
+        spot = placement.spot_at(flat, 0.0)
+        placement.stand(
             f"column {index}",
             choose(rng, kinds),
             material,
@@ -425,11 +426,11 @@ def _colonnade(rng: np.random.Generator, plan: _Plan, stone: Stuff) -> None:
 
 
 def _lights(rng: np.random.Generator, config: SintelConfig, plan: _Plan) -> tuple[Light, ...]:
-    """One sun, often low; sometimes a lamp that fills the shadows of the people."""
-    stage, d = plan.stage, plan.depth_m
-    target = stage.spot(0.0, d).ground_m + np.array((0.0, 0.0, 0.5 * PERSON_M))
-    lights: list[Light] = [sample_sun(rng, stage.pose)]
-    lights += [sample_area_light(rng, stage.pose, target, d) for _ in range(integer(rng, *config.lamps))]
+    """One sun, often low; sometimes a lamp that lightens the shadows of the people."""
+    placement, d = plan.placement, plan.depth_m
+    target = placement.spot(0.0, d).ground_m + np.array((0.0, 0.0, 0.5 * PERSON_M))
+    lights: list[Light] = [sample_sun(rng, placement.pose)]
+    lights += [sample_area_light(rng, placement.pose, target, d) for _ in range(integer(rng, *config.lamps))]
     return tuple(lights)
 
 

@@ -1,4 +1,4 @@
-"""What the shape generators share: grids, tubes, welding, creases, texture coordinates.
+"""Building blocks of meshes: grids, tubes, welding, creases, texture coordinates.
 
 All functions take (V, 3) float64 vertices and (F, 3) triangles.
 """
@@ -17,9 +17,11 @@ from scenes.geometry.mesh import Mesh
 
 Vertices = NDArray[np.float64]
 Triangles = NDArray[np.int64]
+Part = tuple[Vertices, Triangles]
+"""A surface: its vertices (V, 3) and its triangles (F, 3)."""
 
 _MIN_DOUBLE_AREA = 1e-12
-"""Triangles of less than half this area (local units squared) have no direction worth keeping."""
+"""Triangles of less than half this area (local units squared) are dropped: they have no direction."""
 
 
 def solid(
@@ -30,11 +32,11 @@ def solid(
     smooth: bool = False,
     crease_deg: float | None = 40.0,
 ) -> Mesh:
-    """Finish a closed surface into a Mesh: fitted to the unit cube, outward, welded, clean, textured.
+    """A Mesh from a closed surface: fitted to the unit cube, oriented outward, welded, textured.
 
-    `uv` (F, 3, 2) are texture coordinates in the units of `vertices`; without them the surface is box
-    mapped. With `smooth`, edges sharper than `crease_deg` stay sharp: their vertices are split (None where
-    there are no such edges).
+    `uv` (F, 3, 2) are texture coordinates in the unit of `vertices`; without them the surface is box mapped.
+    With `smooth`, edges sharper than `crease_deg` stay sharp: their vertices are split. None says that there
+    are no such edges.
     """
     vertices, factor = fit_to_cube(vertices)
     vertices, triangles, kept, normals = _merged(vertices, triangles)
@@ -76,7 +78,7 @@ def weld(vertices: Vertices, triangles: Triangles) -> tuple[Vertices, Triangles,
 def _merged(
     vertices: Vertices, triangles: Triangles
 ) -> tuple[Vertices, Triangles, NDArray[np.intp], Vertices]:
-    """What `weld` returns, and the remaining triangles' scaled normals."""
+    """The result of `weld`, and the scaled normals of the remaining triangles."""
     low, high = mesh_kernels.bounds(vertices)
     # The odd factor keeps 0, 1/2 and the like off the rounding boundaries.
     keys = mesh_kernels.cell_keys(vertices, low, 2097000.123 / float((high - low).max()))
@@ -88,7 +90,7 @@ def _merged(
 
 
 def scaled_normals(vertices: Vertices, triangles: Triangles) -> Vertices:
-    """(F, 3) triangle normals, their length twice the area."""
+    """(F, 3) triangle normals, their lengths twice the areas."""
     normals: Vertices = mesh_kernels.triangle_normals(vertices, triangles)
     return normals
 
@@ -131,12 +133,52 @@ def grid_triangles(
     return cells.reshape(-1, 3).astype(np.int64)
 
 
+def grid_rim(rows: int, columns: int) -> NDArray[np.int64]:
+    """Indices of the border of a grid of rows x columns vertices, once around in the sense of its triangles."""
+    index = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
+    return np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
+
+
+def slab_triangles(rows: int, columns: int) -> Triangles:
+    """The closed slab between two grids of rows x columns vertices: first all of the top, then all of the bottom."""
+    count = rows * columns
+    face, rim = grid_triangles(rows, columns), grid_rim(rows, columns)
+    following = np.roll(rim, -1)
+    walls = [
+        np.stack([rim, rim + count, following + count], -1),
+        np.stack([rim, following + count, following], -1),
+    ]
+    return np.concatenate([face, face[:, ::-1] + count, *walls])
+
+
+def block_under(
+    top: NDArray[np.float64], floor: float, middle: tuple[float, float] | None = None
+) -> tuple[Vertices, Triangles]:
+    """The closed block between a surface (R, C, 3) and a flat floor at z = `floor`.
+
+    The floor is a fan about `middle` (x, y), by default the mean of the surface's points.
+    """
+    rows, columns = top.shape[:2]
+    ring = grid_rim(rows, columns)
+    points = top.reshape(-1, 3)
+    skirt = np.column_stack([points[ring, :2], np.full(len(ring), floor)])
+    below = len(points) + np.arange(len(ring))
+    along, along_below = np.roll(ring, -1), np.roll(below, -1)
+    hub = np.full(len(ring), len(points) + len(ring))
+    walls = [np.stack([ring, below, along_below], -1), np.stack([ring, along_below, along], -1)]
+    triangles = np.concatenate(
+        [grid_triangles(rows, columns), *walls, np.stack([hub, along_below, below], -1)]
+    )
+    centre = points[:, :2].mean(axis=0) if middle is None else middle
+    return np.concatenate([points, skirt, [(*centre, floor)]]), triangles
+
+
 def revolve(
     radius: NDArray[np.float64], height: NDArray[np.float64], sides: int, angle: float = 0.0
 ) -> tuple[Vertices, Triangles]:
-    """The surface swept by a profile (radius, height), (N,) each, about the z axis.
+    """The surface of revolution of a profile (radius, height), (N,) each, about the z axis.
 
-    Closed when the profile starts and ends on the axis; the poles are welded later, by `solid`.
+    It is closed where the profile starts and ends on the axis; `solid` welds the poles.
     """
     theta = angle + np.linspace(0, 2 * np.pi, sides, endpoint=False)
     x, y = radius[:, None] * np.cos(theta), radius[:, None] * np.sin(theta)
@@ -147,7 +189,7 @@ def revolve(
 def tube(
     path: Vertices, radius: NDArray[np.float64], sides: int, *, closed: bool = False
 ) -> tuple[Vertices, Triangles, NDArray[np.float64]]:
-    """A round tube along a path (N, 3) of given radii (N,): vertices, triangles and (F, 3, 2) coordinates.
+    """A round tube along a path (N, 3) of given radii (N,): vertices, triangles, (F, 3, 2) texture coordinates.
 
     Frames are transported without twist by double reflection (Wang et al., "Computation of rotation
     minimizing frames", 2008). Texture coordinates are arc length along and around, mirrored half way round
@@ -179,7 +221,7 @@ def tube(
 
 
 def _transported_frames(path: Vertices, closed: bool) -> tuple[Vertices, Vertices]:
-    """Two unit normals per point of a path, turning no more than the path makes them."""
+    """Two unit normals for each point of a path, with the least rotation along it."""
     tangent = np.gradient(path, axis=0)
     if closed:
         tangent = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)
@@ -239,7 +281,7 @@ def struts(
 
 
 def joined(*parts: tuple[Vertices, Triangles]) -> tuple[Vertices, Triangles]:
-    """Several surfaces as one."""
+    """Several surfaces as one, with the triangles of each in turn."""
     offsets = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
     vertices = np.concatenate([vertices for vertices, _ in parts])
     triangles = np.concatenate([t + offset for (_, t), offset in zip(parts, offsets, strict=False)])
@@ -248,7 +290,7 @@ def joined(*parts: tuple[Vertices, Triangles]) -> tuple[Vertices, Triangles]:
 
 @lru_cache(maxsize=8)
 def icosphere(subdivisions: int) -> tuple[Vertices, Triangles]:
-    """The unit sphere as 20 * 4^subdivisions triangles."""
+    """The unit sphere as 20 * 4^subdivisions triangles. The arrays are shared: do not change them."""
     sphere = trimesh.creation.icosphere(subdivisions=subdivisions)
     return np.array(sphere.vertices, np.float64), np.array(sphere.faces, np.int64)
 

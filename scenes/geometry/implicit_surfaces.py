@@ -1,4 +1,4 @@
-"""Soft bodies as implicit surfaces: blended capsules, meshed by surface nets."""
+"""Implicit surfaces of soft bodies: blended capsules, meshed by surface nets."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.geometry.building import Triangles, Vertices
+from stereoforge_kit.errors import InputError
 
 
 def capsule_distances(
@@ -31,7 +32,7 @@ def capsule_distances(
 
 
 _CHUNK = 4096
-"""Points whose distances to all capsules fit in a core's cache together, which is three times as fast."""
+"""Points at a time: their distances to all capsules fit into a core's cache, which is three times as fast."""
 
 
 def blended_capsules(
@@ -42,7 +43,10 @@ def blended_capsules(
     end_radius: NDArray[np.float64],
     blend: float,
 ) -> NDArray[np.float64]:
-    """(N,) smooth minimum of the distances: capsules closer than about `blend` melt into one."""
+    """(N,) smooth minimum of the distances of points (N, 3) to capsules: they blend where closer than about `blend`.
+
+    It is -blend * log(sum(exp(-distance / blend))). The other arguments are those of `capsule_distances`.
+    """
     field = np.empty(len(points))
     for first in range(0, len(points), _CHUNK):
         part = slice(first, first + _CHUNK)
@@ -61,7 +65,7 @@ def surface_net(field: NDArray[np.float64]) -> tuple[Vertices, Triangles]:
     """
     inside = field < 0
     if not inside.any():
-        raise ValueError("the field is nowhere negative: there is no surface")
+        raise InputError("the field is nowhere negative: there is no surface")
     cells = np.array(field.shape) - 1
     total = np.zeros((*cells, 3))
     crossings = np.zeros(cells, np.int32)

@@ -6,10 +6,11 @@ Each does the arithmetic of the numpy expression it stands for, in the same orde
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from stereoforge_kit.kernels import njit
 
 
-@njit(cache=True)
+@njit()
 def bounds(vertices):
     """(3,) least and (3,) greatest coordinates of vertices (V, 3)."""
     low, high = vertices[0].copy(), vertices[0].copy()
@@ -20,7 +21,7 @@ def bounds(vertices):
     return low, high
 
 
-@njit(cache=True)
+@njit()
 def cell_keys(vertices, low, steps_per_unit):
     """(V,) one integer a vertex, 21 bits an axis: the cell of a fine grid that it lies in."""
     keys = np.empty(len(vertices), np.int64)
@@ -32,7 +33,7 @@ def cell_keys(vertices, low, steps_per_unit):
     return keys
 
 
-@njit(cache=True)
+@njit()
 def triangle_normals(vertices, triangles):
     """(F, 3) normals of triangles (F, 3), their length twice the area."""
     normals = np.empty((len(triangles), 3))
@@ -46,7 +47,7 @@ def triangle_normals(vertices, triangles):
     return normals
 
 
-@njit(cache=True)
+@njit()
 def merged(vertices, triangles, keys, order, least_double_area):
     """Vertices of equal keys merged, triangles of less than a least double area dropped, unused vertices too.
 
@@ -86,7 +87,7 @@ def merged(vertices, triangles, keys, order, least_double_area):
     return distinct[: count + 1][used], clean, kept, normals[kept]
 
 
-@njit(cache=True)
+@njit()
 def dominant_plane_uv(vertices, triangles, normals):
     """(F, 3, 2) coordinates of triangles projected along the dominant axis of their normals."""
     uv = np.empty((len(triangles), 3, 2))
@@ -103,7 +104,7 @@ def dominant_plane_uv(vertices, triangles, normals):
     return uv
 
 
-@njit(cache=True)
+@njit()
 def shared_edges(triangles, vertex_count):
     """Pairs of half-edges (P,), (P,) along the same edge; half-edge 3 f + k leaves corner k of triangle f.
 
@@ -137,7 +138,7 @@ def shared_edges(triangles, vertex_count):
     return one[:pairs], two[:pairs]
 
 
-@njit(cache=True)
+@njit()
 def corner_groups(corner_count, one, two):
     """How many groups the corners fall into that are joined across pairs of half-edges, and each corner's group.
 
@@ -173,7 +174,7 @@ def corner_groups(corner_count, one, two):
     return groups, label
 
 
-@njit(cache=True)
+@njit()
 def split_at_creases(vertices, triangles, normals, least_cosine):
     """Vertices and triangles where the corners of triangles share a vertex only across soft edges.
 

@@ -1,4 +1,4 @@
-"""Thin pointed strips by the thousand: blades of grass, leaflets, tufts of fur, each one closed."""
+"""Thin pointed strips in large numbers: blades of grass, leaves, leaflets. Each is a closed surface."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def strips(
 ) -> tuple[Vertices, Triangles]:
     """Strips with a lens-shaped section along curves, running to a point at either end.
 
-    `paths` (N, K, 3), K at least 3, are the middle lines; `side` (N, 3) the direction of each strip's width;
-    `half_width` (N, K - 2) the widths between the ends; `thickness` is relative to the width. A strip has
+    `paths` (N, K, 3), K at least 3, are the middle lines and `side` (N, 3) the directions of the widths.
+    `half_width` (N, K - 2) are half the widths between the ends; `thickness` is relative to them. A strip has
     8 (K - 2) triangles.
     """
     count, stations = paths.shape[:2]
@@ -65,8 +65,8 @@ def arched(
     return straight
 
 
-def horizontal_side(direction: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """(N, 3) unit vectors across each direction (N, 3), level where the direction is not upright."""
+def width_directions(direction: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """(N, 3) unit vectors across directions (N, 3), for a strip's width: level unless the direction is upright."""
     heading = rng.uniform(0.0, 2 * np.pi, len(direction))
     aside = np.stack([np.cos(heading), np.sin(heading), np.zeros(len(direction))], -1)
     level = np.cross(direction, (0.0, 0.0, 1.0))
@@ -79,7 +79,7 @@ def horizontal_side(direction: NDArray[np.float64], rng: np.random.Generator) ->
 def around(
     rng: np.random.Generator, count: int, elevation_deg: tuple[float, float], start_deg: float = 0.0
 ) -> NDArray[np.float64]:
-    """(N, 3) unit directions spread evenly about the z axis, jittered, at elevations in a range."""
+    """(count, 3) unit vectors spread evenly about the z axis, with jitter, at elevations in a range."""
     heading = np.radians(start_deg) + 2 * np.pi * (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
     elevation = np.radians(rng.uniform(*elevation_deg, count))
     flat = np.cos(elevation)

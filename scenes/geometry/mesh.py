@@ -1,4 +1,4 @@
-"""Triangle meshes as numpy arrays: what shapes build and Blender receives."""
+"""Triangle meshes as numpy arrays, as shapes build them and Blender receives them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Mesh:
     triangles: NDArray[np.int32]
     """(F, 3) indices into `vertices`, counter-clockwise seen from outside."""
     corner_uv: NDArray[np.float32]
-    """(F, 3, 2) texture coordinates of each triangle's corners, in local units (in metres for shapes made to
-    measure)."""
+    """(F, 3, 2) texture coordinates of each triangle's corners, in local units (in metres for metric
+    shapes)."""
     smooth: bool = False
     """Whether shading normals are interpolated over the surface (geometry is unaffected)."""

@@ -1,55 +1,61 @@
-"""Living figures: skeletons of random proportions, the flesh, fur and clothes on them, and how they move.
+"""Characters: skeletons of random proportions, their bodies and fur, and how they move.
 
-A figure faces +x, its left is +y, and its feet stand at z = 0. Its coordinates are in body units, about one
+A character faces +x, its left is +y, and its feet stand at z = 0. Its coordinates are in body units, about one
 body height.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from scenes.motion.deformations.articulated import Articulated, Joint
+from scenes.motion.trajectories import key_times
+from scenes.placement.assembly import anchored_object
+from scenes.placement.boxes import OrientedBox
+from scenes.placement.ground import GroundPlacement, Spot
 from scenes.random_draws import chance, choose, integer, new_seed, uniform
-from scenes.shapes.anchored import Standing
-from scenes.shapes.nature.creatures import Eyeballs, Limb, SoftBody
+from scenes.shapes.anchored import PartedShape
+from scenes.shapes.nature.soft_bodies import Eyeballs, Limb, SoftBody, iris_repeats
 from scenes.spec import Vector
 
-BONE = -1
-"""`carried_by` of a part that is skinned."""
+SKINNED = -1
+"""`CharacterPart.carried_by` of a part that is skinned instead of carried by one joint."""
 
 
 @dataclass(frozen=True)
-class FigurePart:
-    """One mesh of a figure."""
+class CharacterPart:
+    """One mesh of a character."""
 
-    shape: Standing
-    stuff: str
-    """What it is made of: fur, skin, cloth, hair, horn, eye, leather, wood."""
-    carried_by: int = BONE
-    """Joint it follows rigidly, or `BONE`."""
+    shape: PartedShape
+    material: str
+    """Name of what it is made of: fur, skin, cloth, hair, horn, eye, leather or wood."""
+    carried_by: int = SKINNED
+    """Index of the joint it follows rigidly, or `SKINNED`."""
 
 
 @dataclass(frozen=True)
-class Figure:
-    """A body that can be put into a scene."""
+class Character:
+    """A body in parts, with its skeleton and its motion."""
 
-    parts: tuple[FigurePart, ...]
+    parts: tuple[CharacterPart, ...]
     joints: tuple[Joint, ...]
     feet: tuple[int, ...]
     period_frames: float
     stride: float
-    """How far it walks in a frame, in body units; 0 when it stays where it is."""
+    """How far it walks in a frame, in body units; 0 for a character that stays where it is."""
     height: float
-    """Of the highest point at rest, in body units."""
+    """Height of the highest point at rest, in body units."""
     reach: float
-    """Farthest any of it gets from its foot's spot on the ground plan, in body units."""
+    """Largest horizontal distance of any of its points from its anchor over time, in body units."""
 
-    def deformation(self, part: FigurePart) -> Articulated:
+    def deformation(self, part: CharacterPart) -> Articulated:
         """The motion of one of its parts, in that part's mesh coordinates."""
-        frame = part.shape.frame()
+        frame = part.shape.frame
         x, y, z = (float(value) for value in frame.centre)
         return Articulated(
             joints=self.joints,
@@ -61,8 +67,8 @@ class Figure:
         )
 
 
-class Body:
-    """A figure under construction."""
+class CharacterBuilder:
+    """A character under construction: its joints, and its flesh by groups that each become one mesh."""
 
     def __init__(self) -> None:
         self.joints: list[Joint] = []
@@ -79,10 +85,12 @@ class Body:
         phase: float = 0.0,
         cycles: int = 1,
     ) -> int:
+        """Add a joint (`Joint`); returns its index. `parent` is -1 for the root; lengths are body units."""
         self.joints.append(Joint(parent, start, end, radius, axis, swing_deg, cycles, phase))
         return len(self.joints) - 1
 
     def flesh(self, group: str, start: Vector, end: Vector, radius: float, end_radius: float) -> None:
+        """Add a capsule of flesh to the group of limbs that becomes one mesh."""
         self.limbs.setdefault(group, []).append(Limb(start, end, radius, end_radius))
 
     def bone(
@@ -97,14 +105,14 @@ class Body:
         phase: float = 0.0,
         cycles: int = 1,
     ) -> int:
-        """A joint with its flesh."""
+        """Add a joint with its flesh, of the given radii at both ends; returns its index."""
         self.flesh(group, start, end, *radii)
         return self.joint(parent, start, end, sum(radii) / 2, axis, swing_deg, phase, cycles)
 
 
 @dataclass(frozen=True)
 class Gait:
-    """How a figure moves."""
+    """How a character moves: amplitudes of its joints in degrees, and the period."""
 
     walks: bool
     leg_deg: float
@@ -115,6 +123,7 @@ class Gait:
 
 
 def sample_gait(rng: np.random.Generator) -> Gait:
+    """Draw a random gait; half of them walk."""
     walks = chance(rng, 0.5)
     return Gait(
         walks=walks,
@@ -128,24 +137,24 @@ def sample_gait(rng: np.random.Generator) -> Gait:
 
 @dataclass(frozen=True)
 class Coat:
-    """What a creature's skin is like."""
+    """The skin of a creature."""
 
     tufts: int
     """Locks of fur; 0 for bare skin."""
     tuft_length: float
     """In body units."""
     cells: int
-    """Grid cells along the body: how finely it is meshed."""
+    """Grid cells along the body's longest side: how finely it is meshed."""
 
 
-def sample_creature(rng: np.random.Generator, coat: Coat) -> Figure:
-    """A soft animal that never was: two-legged, four-legged or a crawler."""
+def sample_creature(rng: np.random.Generator, coat: Coat) -> Character:
+    """A random invented animal: two-legged, four-legged or crawling."""
     plan = choose(rng, (_biped, _quadruped, _crawler), (0.5, 0.35, 0.15))
     return plan(rng, coat)
 
 
-def _biped(rng: np.random.Generator, coat: Coat) -> Figure:
-    body, gait = Body(), sample_gait(rng)
+def _biped(rng: np.random.Generator, coat: Coat) -> Character:
+    body, gait = CharacterBuilder(), sample_gait(rng)
     leg, trunk = uniform(rng, 0.12, 0.34), uniform(rng, 0.24, 0.42)
     girth = uniform(rng, 0.11, 0.2)
     hip, chest = leg + 0.5 * girth, leg + 0.5 * girth + trunk
@@ -180,8 +189,8 @@ def _biped(rng: np.random.Generator, coat: Coat) -> Figure:
     return _creature(rng, body, gait, coat, feet, head, leg)
 
 
-def _quadruped(rng: np.random.Generator, coat: Coat) -> Figure:
-    body, gait = Body(), sample_gait(rng)
+def _quadruped(rng: np.random.Generator, coat: Coat) -> Character:
+    body, gait = CharacterBuilder(), sample_gait(rng)
     leg, length, girth = uniform(rng, 0.2, 0.45), uniform(rng, 0.35, 0.6), uniform(rng, 0.11, 0.19)
     back = leg + 0.6 * girth
     root = body.bone(
@@ -220,9 +229,9 @@ def _quadruped(rng: np.random.Generator, coat: Coat) -> Figure:
     return _creature(rng, body, gait, coat, feet, head, leg)
 
 
-def _crawler(rng: np.random.Generator, coat: Coat) -> Figure:
-    """A row of balls on stubby legs that wriggles."""
-    body, gait = Body(), sample_gait(rng)
+def _crawler(rng: np.random.Generator, coat: Coat) -> Character:
+    """A row of balls on stubby legs that wriggles sideways."""
+    body, gait = CharacterBuilder(), sample_gait(rng)
     segments, girth = integer(rng, 5, 8), uniform(rng, 0.09, 0.14)
     step = 1.35 * girth
     root, parent = -1, -1
@@ -249,7 +258,9 @@ def _crawler(rng: np.random.Generator, coat: Coat) -> Figure:
     return _creature(rng, body, gait, coat, [], head, 0.0)
 
 
-def _leg(body: Body, gait: Gait, parent: int, hip: Vector, side: float, radius: float, phase: float) -> int:
+def _leg(
+    body: CharacterBuilder, gait: Gait, parent: int, hip: Vector, side: float, radius: float, phase: float
+) -> int:
     """Thigh, shin and foot; returns the joint whose end is on the ground."""
     x, y, z = hip
     knee, ankle = (x + 0.06 * z, y + 0.01 * side, 0.52 * z), (x, y + 0.015 * side, 0.8 * radius)
@@ -263,7 +274,9 @@ def _leg(body: Body, gait: Gait, parent: int, hip: Vector, side: float, radius: 
     return shin
 
 
-def _tail(rng: np.random.Generator, body: Body, parent: int, start: Vector, radius: float) -> None:
+def _tail(
+    rng: np.random.Generator, body: CharacterBuilder, parent: int, start: Vector, radius: float
+) -> None:
     """A chain that curls up or hangs, wagging more towards its tip."""
     joints, curl = integer(rng, 3, 5), uniform(rng, -0.25, 0.7)
     length, angle = uniform(rng, 0.08, 0.16), uniform(rng, -0.5, 0.4)
@@ -279,8 +292,10 @@ def _tail(rng: np.random.Generator, body: Body, parent: int, start: Vector, radi
         start, angle = end, angle + curl
 
 
-def _head(rng: np.random.Generator, body: Body, gait: Gait, parent: int, neck: Vector, skull: float) -> int:
-    """Skull, snout, ears, sometimes horns; the eyes sit where `_eyes` puts them."""
+def _head(
+    rng: np.random.Generator, body: CharacterBuilder, gait: Gait, parent: int, neck: Vector, skull: float
+) -> int:
+    """Skull, snout, ears, eyes, sometimes horns; returns the joint of the head."""
     x, y, z = neck
     middle = (x + 0.35 * skull, y, z + 0.75 * skull)
     head = body.bone(
@@ -335,8 +350,14 @@ def _head(rng: np.random.Generator, body: Body, gait: Gait, parent: int, neck: V
 
 
 def _creature(
-    rng: np.random.Generator, body: Body, gait: Gait, coat: Coat, feet: list[int], head: int, leg: float
-) -> Figure:
+    rng: np.random.Generator,
+    body: CharacterBuilder,
+    gait: Gait,
+    coat: Coat,
+    feet: list[int],
+    head: int,
+    leg: float,
+) -> Character:
     skin = SoftBody(
         limbs=tuple(body.limbs["body"]),
         blend=uniform(rng, 0.008, 0.016),
@@ -349,21 +370,32 @@ def _creature(
     )
     eyes = body.limbs["eye"]
     balls = Eyeballs(tuple(eye.start for eye in eyes), (1.0, 0.0, 0.12), eyes[0].start_radius)
-    parts = [FigurePart(skin, "fur"), FigurePart(balls, "eye", head)]
+    parts = [CharacterPart(skin, "fur"), CharacterPart(balls, "eye", head)]
     if "horn" in body.limbs:
         horns = SoftBody(tuple(body.limbs["horn"]), 0.002, 0.0, 0, 0.0, (0.0, 0.0, 0.0), 30, new_seed(rng))
-        parts.append(FigurePart(horns, "horn", head))
-    return assembled(tuple(parts), body, gait, tuple(feet), leg, coat.tuft_length if coat.tufts else 0.0)
+        parts.append(CharacterPart(horns, "horn", head))
+    return assemble_character(
+        tuple(parts), body, gait, tuple(feet), leg, coat.tuft_length if coat.tufts else 0.0
+    )
 
 
-def assembled(
-    parts: tuple[FigurePart, ...], body: Body, gait: Gait, feet: tuple[int, ...], leg: float, fringe: float
-) -> Figure:
+def assemble_character(
+    parts: tuple[CharacterPart, ...],
+    body: CharacterBuilder,
+    gait: Gait,
+    feet: tuple[int, ...],
+    leg: float,
+    fringe: float,
+) -> Character:
+    """A character from its meshes and the builder's joints.
+
+    `leg` is the length of the legs, which sets the stride; `fringe` how far fur stands out, in body units.
+    """
     ends = [(limb.end, limb.end_radius) for group in body.limbs.values() for limb in group]
     ends += [(limb.start, limb.start_radius) for group in body.limbs.values() for limb in group]
     # A walker covers four times the reach of a leg's swing in a period.
     stride = 4 * leg * math.sin(math.radians(gait.leg_deg)) / gait.period_frames if gait.walks else 0.0
-    return Figure(
+    return Character(
         parts=parts,
         joints=tuple(body.joints),
         feet=feet,
@@ -372,3 +404,66 @@ def assembled(
         height=max(end[2] + radius for end, radius in ends) + fringe,
         reach=1.25 * max(math.hypot(*end) + radius for end, radius in ends) + fringe,
     )
+
+
+def place_character(
+    placement: GroundPlacement,
+    name: str,
+    character: Character,
+    materials: dict[str, int],
+    spot: Spot,
+    unit_m: float,
+    *,
+    checked: bool = True,
+) -> bool:
+    """Put a character on the ground; False if it may not stand there.
+
+    `materials` gives the material index of each `CharacterPart.material`; a body unit is `unit_m` long. A
+    character that walks does so in the direction of its heading, which does not change: so its parts, each a
+    mesh with a centre of its own, stay together exactly.
+    """
+    path = _walk(placement, character, spot, unit_m)
+    reach_m, height_m = character.reach * unit_m, character.height * unit_m
+    half = np.array((0.6 * reach_m, 0.6 * reach_m, height_m / 2))
+    for place in path if checked else ():
+        centre = place + np.array((0.0, 0.0, height_m / 2))
+        if not placement.allows(OrientedBox(centre, half, np.eye(3))):
+            return False
+    rotation = Rotation.from_euler("Z", spot.heading_rad)
+    times = tuple(float(time) for time in key_times(placement.frames))
+    placement.add(
+        *(
+            anchored_object(
+                f"{name} {part.material} {index}",
+                part.shape,
+                _part_material(placement, part.shape, materials[part.material]),
+                path,
+                (rotation,) * len(times),
+                times,
+                unit_m=unit_m,
+                deformation=character.deformation(part),
+            )
+            for index, part in enumerate(character.parts)
+        )
+    )
+    return True
+
+
+def _part_material(placement: GroundPlacement, shape: PartedShape, material: int) -> int:
+    """Eyeballs of each size need their texture scaled to it."""
+    if not isinstance(shape, Eyeballs):
+        return material
+    return placement.material(replace(placement.materials[material], repeats=iris_repeats(shape)))
+
+
+def _walk(
+    placement: GroundPlacement, character: Character, spot: Spot, unit_m: float
+) -> list[NDArray[np.float64]]:
+    """(3,) world points of a character's anchor at the key times, on the ground throughout."""
+    heading = np.array((math.cos(spot.heading_rad), math.sin(spot.heading_rad)))
+    step = heading * character.stride * unit_m
+    places = []
+    for time in key_times(placement.frames):
+        plan = spot.ground_m[:2] + step * (time - (placement.frames - 1) / 2)
+        places.append(np.array((*plan, float(placement.ground.height_m(plan[None])[0]))))
+    return places

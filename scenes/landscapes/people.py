@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.landscapes.characters import Body, Figure, FigurePart, Gait, assembled, sample_gait
+from scenes.landscapes.characters import (
+    Character,
+    CharacterBuilder,
+    CharacterPart,
+    Gait,
+    assemble_character,
+    sample_gait,
+)
 from scenes.random_draws import chance, choose, new_seed, uniform
-from scenes.shapes.nature.creatures import Eyeballs, SoftBody, Staff
+from scenes.shapes.nature.soft_bodies import Eyeballs, SoftBody, Staff
 
 _HEM = 0.045
 """Height of a robe's hem over the ground."""
 
 
-def sample_person(rng: np.random.Generator, cells: int) -> Figure:
-    """A human figure of height 1: in a robe, or in tunic, trousers and boots; some with a staff or a hood."""
-    body, gait = Body(), sample_gait(rng)
+def sample_person(rng: np.random.Generator, cells: int) -> Character:
+    """A random person of height 1, in a robe or in tunic, trousers and boots; some have a staff or a hood.
+
+    `cells` is how finely the body is meshed (`SoftBody.cells`).
+    """
+    body, gait = CharacterBuilder(), sample_gait(rng)
     robed = chance(rng, 0.6)
     girth = uniform(rng, 0.085, 0.115)
     root = body.bone(
@@ -45,7 +55,7 @@ def sample_person(rng: np.random.Generator, cells: int) -> Figure:
     return _dressed(rng, body, gait, (head, hands[0]), tuple(feet), cells)
 
 
-def _person_leg(body: Body, gait: Gait, root: int, side: float, phase: float, robed: bool) -> int:
+def _person_leg(body: CharacterBuilder, gait: Gait, root: int, side: float, phase: float, robed: bool) -> int:
     hip, knee, ankle = (0.0, side * 0.055, 0.49), (0.02, side * 0.06, 0.27), (0.0, side * 0.065, 0.05)
     swing = gait.leg_deg * (0.6 if robed else 1.0)
     thigh = body.joint(root, hip, knee, 0.05, swing_deg=swing, phase=phase)
@@ -59,7 +69,7 @@ def _person_leg(body: Body, gait: Gait, root: int, side: float, phase: float, ro
 
 
 def _person_arm(
-    rng: np.random.Generator, body: Body, gait: Gait, root: int, side: float, girth: float
+    rng: np.random.Generator, body: CharacterBuilder, gait: Gait, root: int, side: float, girth: float
 ) -> int:
     """Returns the joint of the forearm, which carries what the hand holds."""
     shoulder, bend = (0.0, side * (girth + 0.03), 0.765), uniform(rng, 0.0, 0.14)
@@ -78,7 +88,7 @@ def _person_arm(
     return fore
 
 
-def _hair(rng: np.random.Generator, body: Body) -> None:
+def _hair(rng: np.random.Generator, body: CharacterBuilder) -> None:
     """Hair to the nape or to the waist, a hood, a beard, or a bald head."""
     style = choose(rng, ("short", "long", "hood", "bald"), (0.3, 0.3, 0.3, 0.1))
     if style == "bald":
@@ -97,13 +107,16 @@ def _hair(rng: np.random.Generator, body: Body) -> None:
 
 def _dressed(
     rng: np.random.Generator,
-    body: Body,
+    body: CharacterBuilder,
     gait: Gait,
     carriers: tuple[int, int],
     feet: tuple[int, ...],
     cells: int,
-) -> Figure:
-    """Meshes for every stuff; `carriers` are the joints of the head and of the hand that may hold a staff."""
+) -> Character:
+    """The person's meshes, one for each material.
+
+    `carriers` are the joints of the head and of the hand that may hold a staff.
+    """
     head, hand = carriers
     folds = uniform(rng, 0.003, 0.008)
     fineness = {"cloth": 1.0, "legs": 0.6, "skin": 0.7, "hair": 0.5, "leather": 0.5}
@@ -122,19 +135,21 @@ def _dressed(
             seed=new_seed(rng),
             floor=_HEM if group == "cloth" else None,
         )
-        parts.append(FigurePart(shape, "cloth" if group == "legs" else group))
+        parts.append(CharacterPart(shape, "cloth" if group == "legs" else group))
     eyes = Eyeballs(((0.058, -0.024, 0.935), (0.058, 0.024, 0.935)), (1.0, 0.0, 0.0), 0.013)
-    parts.append(FigurePart(eyes, "eye", head))
+    parts.append(CharacterPart(eyes, "eye", head))
     if chance(rng, 0.4):
         x, y, _ = body.joints[hand].end
         staff = Staff(
             (x + 0.04, y, 0.0), uniform(rng, 0.85, 1.25), 0.012, uniform(rng, 0.0, 0.05), new_seed(rng)
         )
-        parts.append(FigurePart(staff, "wood", hand))
-    return assembled(tuple(parts), body, gait, feet, 0.5, 0.0)
+        parts.append(CharacterPart(staff, "wood", hand))
+    return assemble_character(tuple(parts), body, gait, feet, 0.5, 0.0)
 
 
-def statue(rng: np.random.Generator, figure: Figure) -> SoftBody:
-    """All of a figure's flesh as one body, to be hewn from stone."""
-    limbs = [limb for part in figure.parts if isinstance(part.shape, SoftBody) for limb in part.shape.limbs]
+def statue(rng: np.random.Generator, character: Character) -> SoftBody:
+    """A statue of a character: all its flesh as one body."""
+    limbs = [
+        limb for part in character.parts if isinstance(part.shape, SoftBody) for limb in part.shape.limbs
+    ]
     return SoftBody(tuple(limbs), 0.006, 0.003, 0, 0.0, (0.0, 0.0, 0.0), 60, new_seed(rng), 0.0)

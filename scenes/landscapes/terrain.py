@@ -1,4 +1,4 @@
-"""Land, and a stereo rig that looks over it at something: what families of landscapes start from."""
+"""What the landscape families share: land, a stereo rig that looks over it at a subject, a final pass."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.family import FamilyConfig
-from scenes.motion.trajectories import KEY_SPACING_FRAMES, exposure_times, vector, wander
+from scenes.motion.trajectories import KEY_SPACING_FRAMES, vector, wander
 from scenes.random_draws import Range, chance, log_uniform, uniform
 from scenes.shapes.nature.landforms import Landscape
 from scenes.spec import Color, FinalPass, Fog, StereoCamera
+from stereoforge_kit.errors import InputError
 
 NEAREST_SHARE = 0.105
 """Disparity of the nearest surface allowed, as a share of the image width: 101 px at 960."""
@@ -22,17 +23,17 @@ NEAREST_SHARE = 0.105
 
 @dataclass(frozen=True)
 class LandscapeConfig(FamilyConfig):
-    """What families of landscapes have in common: a camera that looks at a figure on open land."""
+    """Settings that the landscape families share: a camera that looks at a character on open land."""
 
     focal_mm: Range = (22.0, 45.0)
     """Focal length on a sensor 32 mm wide."""
     focus_disparity_share: Range = (0.016, 0.045)
-    """Disparity of the figure the scene is about, as a share of the image width (0.016 is 15 px at 960);
+    """Disparity of the main character, as a share of the image width (0.016 is 15 px at 960);
     it sets the baseline."""
     focus_height_share: Range = (0.45, 0.8)
-    """Height of that figure, as a share of the image height."""
+    """Height of that character, as a share of the image height."""
     camera_speed: Range = (0.0, 0.015)
-    """Speed of the camera, as a share of the figure's distance per frame."""
+    """Speed of the camera, as a share of the character's distance per frame."""
     camera_turn_deg: Range = (0.0, 0.5)
     """How fast the camera turns, degrees per frame."""
     sky_strength: Range = (0.7, 1.6)
@@ -44,18 +45,18 @@ class LandscapeConfig(FamilyConfig):
         super().__post_init__()
         for name in ("focal_mm", "focus_disparity_share", "focus_height_share"):
             if getattr(self, name)[0] <= 0:
-                raise ValueError(f"{name} must be above 0, got {getattr(self, name)}")
+                raise InputError(f"{name} must be above 0, got {getattr(self, name)}")
         if self.focus_disparity_share[1] > NEAREST_SHARE / 2:
-            raise ValueError(f"focus_disparity_share must not exceed {NEAREST_SHARE / 2}")
+            raise InputError(f"focus_disparity_share must not exceed {NEAREST_SHARE / 2}")
 
 
 @dataclass(frozen=True)
 class Land:
-    """The ground and how large it is; its middle is the world's origin."""
+    """The ground of a landscape (`scenes.placement.ground.Ground`); its middle is the world's origin."""
 
     shape: Landscape
     half_m: float
-    """Half its side."""
+    """Half the side of the square it covers."""
 
     @cached_property
     def _heights_m(self) -> NDArray[np.float64]:
@@ -78,14 +79,14 @@ class Land:
         )
         return height
 
-    def rest_m(self) -> float:
-        """World z of the mesh's origin."""
+    def mesh_origin_m(self) -> float:
+        """World z of the origin of the mesh."""
         return -self.shape.middle_height() * self.half_m
 
 
 @dataclass(frozen=True)
 class Focus:
-    """What the scene is about, and how the camera sees it."""
+    """The subject of a scene, and how the camera sees it."""
 
     depth_m: float
     """Distance along the optical axis."""
@@ -93,9 +94,9 @@ class Focus:
     """Its height."""
     disparity_share: float
     """Its disparity as a share of the image width."""
-    eye_height_m: float
+    camera_height_m: float
     above_deg: float
-    """How far above its middle the camera looks."""
+    """Angle by which the camera looks above the subject's middle."""
     focal_mm: float
     speed_m: float
     """Of the camera, a frame."""
@@ -111,9 +112,9 @@ class Focus:
 def sample_camera(
     rng: np.random.Generator, width: int, height: int, frames: int, land: Land, focus: Focus
 ) -> StereoCamera:
-    """A rig over the origin that looks along +y at the middle of the focus, on a smooth path.
+    """A rig over the world's origin that looks along +y at the subject, on a smooth path.
 
-    Its baseline is such that the focus has its disparity; none of its path comes near the ground.
+    The baseline gives the subject its disparity. The path stays clear of the ground.
     """
     focal_px = focus.focal_mm / 32.0 * width
     baseline_m = focus.disparity_share * width * focus.depth_m / focal_px
@@ -121,7 +122,7 @@ def sample_camera(
     angle = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle)], -1)
     around = np.concatenate([circle * share for share in (0.0, 0.5, 1.0)]) * (reach_m + baseline_m)
-    above_m = max(focus.eye_height_m, reach_m + 0.4 * focus.eye_height_m)
+    above_m = max(focus.camera_height_m, reach_m + 0.4 * focus.camera_height_m)
     eye_m = float(land.height_m(around).max()) + above_m
     target_m = float(land.height_m(np.array([[0.0, focus.depth_m]]))[0]) + 0.5 * focus.size_m
     pitch_deg = math.degrees(math.atan2(eye_m - target_m, focus.depth_m)) - focus.above_deg
@@ -138,13 +139,6 @@ def sample_camera(
     return StereoCamera(width, height, focus.focal_mm, baseline_m, motion)
 
 
-def eye_positions(camera: StereoCamera, frames: int) -> NDArray[np.float64]:
-    """(N, 3) where both eyes are while the scene lasts."""
-    return np.array(
-        [camera.pose(eye, time)[:3, 3] for time in exposure_times(frames) for eye in ("left", "right")]
-    )
-
-
 def half_height(focal_mm: float, config: FamilyConfig) -> float:
     """Tangent of half the vertical field of view."""
     return 16.0 / focal_mm * config.height / config.width
@@ -156,20 +150,20 @@ def sample_focus(
     focal_mm: float,
     depth_m: float,
     size_m: float,
-    eye_height_m: float,
+    camera_height_m: float,
 ) -> Focus:
-    """Look at a figure of a size and at a distance from about a height, the figure about mid-image.
+    """How a camera sees a subject about mid-image, of a size, at a depth, from about a height.
 
-    The eye is raised where the image's lower edge would otherwise show ground nearer than allowed.
+    The camera is raised where the image's lower edge would otherwise show ground nearer than allowed.
     """
     share = uniform(rng, *config.focus_disparity_share)
     half_high = half_height(focal_mm, config)
-    height_m = max(eye_height_m, 1.3 * (half_high + 0.1) * depth_m * share / NEAREST_SHARE)
+    height_m = max(camera_height_m, 1.3 * (half_high + 0.1) * depth_m * share / NEAREST_SHARE)
     return Focus(
         depth_m=depth_m,
         size_m=size_m,
         disparity_share=share,
-        eye_height_m=height_m,
+        camera_height_m=height_m,
         above_deg=uniform(rng, -0.05, 0.3) * math.degrees(half_high),
         focal_mm=focal_mm,
         speed_m=uniform(rng, *config.camera_speed) * depth_m,
@@ -186,7 +180,10 @@ def linear(srgb: tuple[int, int, int]) -> Color:
 def sample_final(
     rng: np.random.Generator, focus_m: float, haze: Color, fog_share: float, visibility_m: Range
 ) -> FinalPass:
-    """A final pass focused on what the scene is about, foggy in `fog_share` of the cases."""
+    """A random final pass, focused on the subject.
+
+    A share `fog_share` of the final passes has fog of the colour `haze`, with a visibility from the given range.
+    """
     return FinalPass(
         shutter_frames=uniform(rng, 0.3, 0.6),
         f_number=log_uniform(rng, 1.8, 11.0),
@@ -195,5 +192,5 @@ def sample_final(
         noise=uniform(rng, 0.0, 0.02),
         vignetting=uniform(rng, 0.0, 0.3),
         exposure_difference_ev=float(rng.normal(0.0, 0.08)),
-        right_eye_color=vector(np.exp(rng.normal(0.0, 0.015, 3))),
+        right_view_color=vector(np.exp(rng.normal(0.0, 0.015, 3))),
     )

@@ -1,7 +1,8 @@
-"""Growth and stones on a stage: trees, thickets, undergrowth, grass, mushrooms, boulders.
+"""Vegetation and stones on the ground: trees, undergrowth, grass, mushrooms, boulders.
 
-A few shapes and a few materials of each kind, standing in many places. Lengths are given by `unit_m`, the
-distance of what the scene is about.
+Each function places a few shapes in a few materials at many spots, so that most objects share their meshes.
+Depths and scales are in units of the area's `unit_m`, the distance of the scene's subject; where a spot is
+not allowed, nothing is placed.
 """
 
 from __future__ import annotations
@@ -13,48 +14,50 @@ from typing import TypeVar
 
 import numpy as np
 
-from scenes.appearance.material_textures import Stuff, bark, cap, horn, leaves
-from scenes.appearance.palettes import FOLIAGE, Tones
-from scenes.placement.stage import Spot, Stage
+from scenes.appearance.material_textures import TextureSampler, bark, cap, horn, leaves
+from scenes.appearance.palettes import FOLIAGE, PaletteRange
+from scenes.placement.ground import GroundPlacement, Spot, sway_of
 from scenes.random_draws import Range, choose, log_uniform, uniform
-from scenes.shapes.anchored import Standing
+from scenes.shapes.anchored import PartedShape
 from scenes.shapes.nature.landforms import Boulder
 from scenes.shapes.nature.plants import GrassTuft, Mushroom, sample_undergrowth
 from scenes.spec import Shape
 
 T = TypeVar("T")
 
-Holds = Callable[[Spot], bool]
+SpotFilter = Callable[[Spot], bool]
 
 
 def anywhere(_: Spot) -> bool:
+    """A filter that lets all spots through."""
     return True
 
 
 @dataclass(frozen=True)
-class Garden:
-    """Where things grow."""
+class VegetationArea:
+    """The part of the ground that vegetation grows on."""
 
-    stage: Stage
+    placement: GroundPlacement
     unit_m: float
-    holds: Holds = anywhere
-    """Which spots are to be planted."""
+    contains: SpotFilter = anywhere
+    """Whether a spot belongs to the area."""
 
     def spots(self, rng: np.random.Generator, count: int, depths: Range, spread: float) -> list[Spot]:
-        """Up to `count` random spots at depths in units."""
+        """Random spots at depths in units of `unit_m`: of `count` draws those that belong to the area."""
         near, far = depths
         drawn = [
-            self.stage.scatter(rng, (near * self.unit_m, far * self.unit_m), spread) for _ in range(count)
+            self.placement.random_spot(rng, (near * self.unit_m, far * self.unit_m), spread)
+            for _ in range(count)
         ]
-        return [spot for spot in drawn if self.holds(spot)]
+        return [spot for spot in drawn if self.contains(spot)]
 
 
-STILL_BEYOND = 2.2
-"""Plants farther away than this many units do not sway: too little to see, and they can share their meshes."""
+NO_SWAY_BEYOND = 2.2
+"""Plants farther away than this many units do not sway: it would hardly be seen, and so they share meshes."""
 
 
-def _outfits(rng: np.random.Generator, kinds: Sequence[T], materials: Sequence[int]) -> list[tuple[T, int]]:
-    """Each kind and each material at least once, in few pairs: things alike in both are one mesh."""
+def _pairings(rng: np.random.Generator, kinds: Sequence[T], materials: Sequence[int]) -> list[tuple[T, int]]:
+    """Pairs of a kind and a material, each used at least once; few pairs, so that objects share meshes."""
     count = max(len(kinds), len(materials)) + 2
     order = rng.permutation(count)
     return [(kinds[k % len(kinds)], materials[int(order[k]) % len(materials)]) for k in range(count)]
@@ -62,80 +65,84 @@ def _outfits(rng: np.random.Generator, kinds: Sequence[T], materials: Sequence[i
 
 def trees(
     rng: np.random.Generator,
-    garden: Garden,
-    kinds: Sequence[Standing],
+    area: VegetationArea,
+    kinds: Sequence[PartedShape],
     count: int,
     depths: Range,
     scales: Range,
-    foliage: Sequence[Stuff],
-    trunk: Stuff = bark,
+    foliage: Sequence[TextureSampler],
+    trunk: TextureSampler = bark,
 ) -> None:
-    """Trees of a few kinds; wood and leaves wear their own stuffs."""
-    stage, unit_m = garden.stage, garden.unit_m
+    """Trees of a few kinds, their wood and leaves in materials of their own."""
+    placement, unit_m = area.placement, area.unit_m
     seen_m = 1.6 * depths[0] * unit_m
-    wood = [stage.wear(rng, trunk, unit_m, seen_m) for _ in range(2)]
-    green = [stage.wear(rng, stuff, unit_m, seen_m) for stuff in foliage]
-    outfits = [(kind, leaf, choose(rng, wood)) for kind, leaf in _outfits(rng, kinds, green)]
-    for index, spot in enumerate(garden.spots(rng, count, depths, 1.2)):
-        kind, leaf, stem = choose(rng, outfits)
-        worn = {"wood": stem, "leaves": leaf}
-        stage.stand_in_parts(f"tree {index}", kind, worn, spot, log_uniform(rng, *scales) * unit_m)
+    wood = [placement.new_material(rng, trunk, unit_m, seen_m) for _ in range(2)]
+    green = [placement.new_material(rng, sampler, unit_m, seen_m) for sampler in foliage]
+    pairs = [(kind, leaf, choose(rng, wood)) for kind, leaf in _pairings(rng, kinds, green)]
+    for index, spot in enumerate(area.spots(rng, count, depths, 1.2)):
+        kind, leaf, stem = choose(rng, pairs)
+        materials = {"wood": stem, "leaves": leaf}
+        placement.stand_in_parts(f"tree {index}", kind, materials, spot, log_uniform(rng, *scales) * unit_m)
 
 
 def plants(
     rng: np.random.Generator,
-    garden: Garden,
+    area: VegetationArea,
     name: str,
     kinds: Sequence[Shape],
     count: int,
     depths: Range,
     scales: Range,
-    foliage: Sequence[Stuff],
+    foliage: Sequence[TextureSampler],
     *,
     sway: Range = (0.01, 0.06),
     sunk: float = 0.02,
     spread: float = 1.2,
 ) -> None:
-    """Swaying plants of a few kinds; `sunk` is how deep they stand, relative to their scale."""
-    stage, unit_m = garden.stage, garden.unit_m
+    """Plants of a few kinds; near ones sway by a share `sway` of their height.
+
+    `sunk` is how deep they stand in the ground, relative to their scale; `spread` is the outermost image column.
+    """
+    placement, unit_m = area.placement, area.unit_m
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
-    green = [stage.wear(rng, stuff, middle_m, 1.4 * depths[0] * unit_m) for stuff in foliage]
-    outfits = _outfits(rng, kinds, green)
-    for index, spot in enumerate(garden.spots(rng, count, depths, spread)):
-        (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
-        moves = spot.depth_m < STILL_BEYOND * unit_m
-        motion = stage.swaying(rng, shape, uniform(rng, *sway)) if moves else None
-        stage.stand(
+    green = [placement.new_material(rng, sampler, middle_m, 1.4 * depths[0] * unit_m) for sampler in foliage]
+    pairs = _pairings(rng, kinds, green)
+    for index, spot in enumerate(area.spots(rng, count, depths, spread)):
+        (shape, material), scale_m = choose(rng, pairs), log_uniform(rng, *scales) * unit_m
+        moves = spot.depth_m < NO_SWAY_BEYOND * unit_m
+        motion = sway_of(rng, shape, uniform(rng, *sway)) if moves else None
+        placement.stand(
             f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk * scale_m, deformation=motion
         )
 
 
 def undergrowth(
     rng: np.random.Generator,
-    garden: Garden,
+    area: VegetationArea,
     count: int,
-    foliage: Sequence[Stuff],
+    foliage: Sequence[TextureSampler],
     scales: Range = (0.12, 0.4),
 ) -> None:
-    """Ferns, broad leaves and bushes; the first six close before the camera, at the image's sides."""
+    """Ferns, broad-leaved plants and bushes, six of them close to the camera."""
     kinds = [sample_undergrowth(rng) for _ in range(7)]
     low, high = scales
-    plants(rng, garden, "near plant", kinds[:3], 6, (0.5, 0.9), (0.6 * low, 0.6 * high), foliage[:2])
-    plants(rng, garden, "plant", kinds, count, (0.8, 6.0), scales, foliage)
+    plants(rng, area, "near plant", kinds[:3], 6, (0.5, 0.9), (0.6 * low, 0.6 * high), foliage[:2])
+    plants(rng, area, "plant", kinds, count, (0.8, 6.0), scales, foliage)
 
 
 def grass(
     rng: np.random.Generator,
-    garden: Garden,
+    area: VegetationArea,
     count: int,
-    tones: Sequence[Tones] = (FOLIAGE,),
+    colors: Sequence[PaletteRange] = (FOLIAGE,),
     scales: Range = (0.06, 0.2),
 ) -> None:
+    """Swaying tufts of grass near the camera."""
     kinds = [GrassTuft.sample(rng) for _ in range(4)]
-    foliage = [leaves(kind) for kind in tones]
+    foliage = [leaves(kind) for kind in colors]
     plants(
         rng,
-        garden,
+        area,
         "grass",
         kinds,
         count,
@@ -149,37 +156,44 @@ def grass(
 
 
 def mushrooms(
-    rng: np.random.Generator, garden: Garden, name: str, count: int, depths: Range, scales: Range, glow: float
+    rng: np.random.Generator,
+    area: VegetationArea,
+    name: str,
+    count: int,
+    depths: Range,
+    scales: Range,
+    glow: float,
 ) -> None:
-    stage, unit_m = garden.stage, garden.unit_m
+    """Mushrooms of a few kinds; `glow` is the emission of their caps (`Material.emission`)."""
+    placement, unit_m = area.placement, area.unit_m
     kinds = [Mushroom.sample(rng) for _ in range(5)]
     middle_m, seen_m = math.sqrt(scales[0] * scales[1]) * unit_m, 1.5 * depths[0] * unit_m
-    pale = stage.wear(rng, horn, middle_m, seen_m)
-    caps = [stage.wear(rng, cap, middle_m, seen_m, emission=glow) for _ in range(3)]
-    outfits = _outfits(rng, kinds, caps)
-    for index, spot in enumerate(garden.spots(rng, count, depths, 1.1)):
-        kind, top = choose(rng, outfits)
-        worn = {"stem": pale, "cap": top}
-        stage.stand_in_parts(f"{name} {index}", kind, worn, spot, log_uniform(rng, *scales) * unit_m)
+    pale = placement.new_material(rng, horn, middle_m, seen_m)
+    caps = [placement.new_material(rng, cap, middle_m, seen_m, emission=glow) for _ in range(3)]
+    pairs = _pairings(rng, kinds, caps)
+    for index, spot in enumerate(area.spots(rng, count, depths, 1.1)):
+        kind, top = choose(rng, pairs)
+        materials = {"stem": pale, "cap": top}
+        placement.stand_in_parts(f"{name} {index}", kind, materials, spot, log_uniform(rng, *scales) * unit_m)
 
 
 def boulders(
     rng: np.random.Generator,
-    garden: Garden,
+    area: VegetationArea,
     name: str,
     count: int,
-    stones: Sequence[Stuff],
+    stones: Sequence[TextureSampler],
     depths: Range = (0.7, 8.0),
     scales: Range = (0.04, 0.35),
     sunk: Range = (0.2, 0.6),
 ) -> None:
-    """Stones sunk into the ground, by `sunk` relative to their scale."""
-    stage, unit_m = garden.stage, garden.unit_m
+    """Stones, sunk into the ground by `sunk` relative to their scale."""
+    placement, unit_m = area.placement, area.unit_m
     kinds = [replace(Boulder.sample(rng), detail=3) for _ in range(4)]
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
-    worn = [stage.wear(rng, stuff, middle_m, 1.8 * depths[0] * unit_m) for stuff in stones]
-    outfits = _outfits(rng, kinds, worn)
-    for index, spot in enumerate(garden.spots(rng, count, depths, 1.15)):
-        (shape, material), scale_m = choose(rng, outfits), log_uniform(rng, *scales) * unit_m
+    rocks = [placement.new_material(rng, sampler, middle_m, 1.8 * depths[0] * unit_m) for sampler in stones]
+    pairs = _pairings(rng, kinds, rocks)
+    for index, spot in enumerate(area.spots(rng, count, depths, 1.15)):
+        (shape, material), scale_m = choose(rng, pairs), log_uniform(rng, *scales) * unit_m
         sunk_m = scale_m * uniform(rng, *sunk)
-        stage.stand(f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk_m)
+        placement.stand(f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk_m)

@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 from scenes.spec import Quaternion, Trajectory, Vector
 
 KEY_SPACING_FRAMES = 8.0
-"""At most this long between key poses: the time scale on which random motion changes its mind."""
+"""Largest distance in time between key poses: the time scale on which random motion changes direction."""
 
 
 def vector(values: NDArray[np.float64]) -> Vector:
+    """A plain tuple of three numbers."""
     x, y, z = (float(value) for value in values)
     return (x, y, z)
 
@@ -26,7 +27,7 @@ def quaternion(rotation: Rotation) -> Quaternion:
 
 
 def key_times(frames: int) -> NDArray[np.float64]:
-    """Key instants from one frame before the first to one after the last, so that no frame is at an end."""
+    """(K,) key times from one frame before the first to one after the last, so that no frame is at an end."""
     count = 2 + math.floor((frames + 1) / KEY_SPACING_FRAMES)
     return np.linspace(-1.0, float(frames), count)
 
@@ -42,9 +43,10 @@ def wander(
     reach_m: float = math.inf,
     reach_deg: float = math.inf,
 ) -> Trajectory:
-    """A smooth random path about a pose, at about `speed_m` and `turn_deg` a frame.
+    """A smooth random trajectory about a pose, moving and turning by about `speed_m` and `turn_deg` a frame.
 
-    Keys are scattered about the pose, no further than `reach_m` and `reach_deg`, however long the scene is.
+    `position_m` (3,) and `rotation` are the pose. Key poses stay within `reach_m` and `reach_deg` of it, however
+    long the scene is.
     """
     times = key_times(frames)
     spacing = float(times[1] - times[0])
@@ -68,11 +70,14 @@ def _in_ball(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
 
 
 def shifted(trajectory: Trajectory, offset_m: NDArray[np.float64]) -> Trajectory:
-    """The same motion elsewhere."""
+    """The same motion, moved by a world offset (3,) in metres."""
     moved = tuple(vector(np.array(position) + offset_m) for position in trajectory.positions_m)
     return Trajectory(trajectory.times_frames, moved, trajectory.rotations)
 
 
 def exposure_times(frames: int) -> NDArray[np.float64]:
-    """Instants at which a motion is checked: all frames, half a frame about them, and no more than 60."""
+    """(N,) instants at which motions are checked, from half a frame before the first frame to half after the last.
+
+    They are half a frame apart, or farther in scenes for which that would take more than 60.
+    """
     return np.linspace(-0.5, frames - 0.5, min(2 * frames + 1, 60))

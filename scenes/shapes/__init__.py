@@ -1,4 +1,4 @@
-"""Shape generators, a module a kind of geometry. A new `Shape` subclass in a module here is found by itself."""
+"""Shape generators, by kind of geometry. A new `Shape` subclass in a module here needs no registration."""
 
 import sys
 

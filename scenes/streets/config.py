@@ -1,4 +1,4 @@
-"""What a user may choose of the driving family."""
+"""The settings of the driving family."""
 
 from __future__ import annotations
 
@@ -6,11 +6,15 @@ from dataclasses import dataclass
 
 from scenes.family import FamilyConfig
 from scenes.random_draws import Count, Range
+from stereoforge_kit.errors import InputError
 
 
 @dataclass(frozen=True)
 class DrivingConfig(FamilyConfig):
-    """Ranges are drawn from uniformly, once a scene or once a thing as the words say."""
+    """Values are drawn uniformly from the ranges, once for each scene or once for each thing, as the fields say.
+
+    Raises ValueError for ranges from which no street can be sampled.
+    """
 
     crowd = ("parked_share", "pedestrians_per_100m", "furniture_per_100m")
     sparsity = ("headway_m", "tree_spacing_m", "lamp_spacing_m")
@@ -18,19 +22,19 @@ class DrivingConfig(FamilyConfig):
     focal_lengths_mm: tuple[float, ...] = (15.0, 35.0)
     """Focal lengths to choose from, on a sensor 32 mm wide."""
     baseline_m: Range = (0.5, 1.0)
-    """Distance between the eyes; made smaller where the road would come nearer than allowed."""
+    """Distance between the cameras; made smaller where the road would come nearer than allowed."""
     largest_disparity_share: float = 0.2
     """Nothing in view has a larger disparity, as a share of the image width: 192 px at 960."""
     clearance_m: float = 1.0
-    """Distance that everything but the road keeps from both eyes at all times."""
+    """Distance that everything but the road keeps from both cameras at all times."""
     camera_height_m: Range = (1.4, 2.2)
-    """Height of the eyes above the road."""
+    """Height of the cameras above the road."""
     pitch_deg: Range = (-3.0, 5.0)
     """How far the camera looks down."""
     roll_deg: Range = (-2.0, 2.0)
-    """How far the camera leans."""
+    """Roll of the camera."""
     yaw_deg: Range = (-6.0, 6.0)
-    """How far the camera looks aside from the street's direction."""
+    """Yaw of the camera from the street's direction."""
     slow_m: Range = (0.15, 0.5)
     """Metres per frame of a slow drive."""
     fast_m: Range = (0.7, 1.6)
@@ -46,7 +50,7 @@ class DrivingConfig(FamilyConfig):
     bend_deg: Range = (6.0, 32.0)
     """How much a winding street may turn within 50 m."""
     view_m: Range = (100.0, 170.0)
-    """How far the street goes on before the camera."""
+    """Length of the street before the camera."""
     lanes: Count = (1, 2)
     """Lanes in each direction."""
     lane_m: Range = (2.9, 3.6)
@@ -79,8 +83,8 @@ class DrivingConfig(FamilyConfig):
         positive = ("baseline_m", "camera_height_m", "lane_m", "pavement_m", "kerb_m", "headway_m", "view_m")
         for name in (*positive, "tree_spacing_m", "lamp_spacing_m", "lanes"):
             if getattr(self, name)[0] <= 0:
-                raise ValueError(f"driving: {name} must be above 0, got {getattr(self, name)}")
+                raise InputError(f"driving: {name} must be above 0, got {getattr(self, name)}")
         if not self.focal_lengths_mm or min(self.focal_lengths_mm) <= 0:
-            raise ValueError(f"driving: focal_lengths_mm must be above 0, got {self.focal_lengths_mm}")
+            raise InputError(f"driving: focal_lengths_mm must be above 0, got {self.focal_lengths_mm}")
         if self.largest_disparity_share <= 0:
-            raise ValueError("driving: largest_disparity_share must be above 0")
+            raise InputError("driving: largest_disparity_share must be above 0")

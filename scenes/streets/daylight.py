@@ -16,7 +16,7 @@ from scenes.textures.sky import Sky
 
 @dataclass(frozen=True)
 class Daylight:
-    """What lights the street apart from lamps."""
+    """The lighting of a street, apart from lamps."""
 
     suns: tuple[SunLight, ...]
     world: World
@@ -26,6 +26,7 @@ class Daylight:
 
 
 def sample_daylight(rng: np.random.Generator, config: DrivingConfig) -> Daylight:
+    """Draw the time of day and the weather: dusk, overcast or a clear sky."""
     if chance(rng, config.dusk_share):
         return _dusk(rng)
     return _day(rng, overcast=chance(rng, config.overcast_share))

@@ -1,4 +1,4 @@
-"""What lines the street: rows of houses by district, gardens, fences, the skyline behind."""
+"""What lines a street: rows of houses by district, gardens, fences, the skyline behind them."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.placement.assembly import Assembly, by_the_street
+from scenes.appearance import street_materials
+from scenes.placement.assembly import Assembly, anchored_object
 from scenes.random_draws import Range, chance, choose, integer, uniform
-from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.anchored import MetricShape
 from scenes.shapes.street.boundaries import Fence, Hedge
 from scenes.shapes.street.buildings import (
+    NOMINAL_BAY_M,
     CityBlock,
     HouseDesign,
     HouseRoof,
@@ -22,15 +24,15 @@ from scenes.shapes.street.buildings import (
 )
 from scenes.shapes.street.road import Course
 from scenes.shapes.street.roadside_plants import Shrub
-from scenes.streets import materials as finishes
+from scenes.streets.along_course import on_course
 
 
 @dataclass(frozen=True)
 class District:
-    """What one side of a street is like."""
+    """A kind of street side."""
 
     share: float
-    """How many sides of streets are of this kind, relative to the others."""
+    """How many street sides are of this kind, relative to the others."""
     houses: tuple[str, ...]
     """Kinds of `HouseDesign`; none for open land."""
     setback_m: Range
@@ -42,7 +44,7 @@ class District:
     trees: float
     """How many of the sides have a row of trees on the pavement."""
     boundary: tuple[str, ...] = ()
-    """What may stand between pavement and garden: kinds of `Fence`, or hedge."""
+    """What may stand between pavement and garden: styles of `Fence`, or "hedge"."""
 
 
 DISTRICTS: dict[str, District] = {
@@ -83,7 +85,7 @@ class Side:
     """Whether a parking lane runs along the kerb."""
 
     def turn_deg(self) -> float:
-        """The turn at which a thing's y axis points away from the street."""
+        """Rotation at which a thing's y axis points away from the street, degrees."""
         return 0.0 if self.sign > 0 else 180.0
 
 
@@ -103,7 +105,9 @@ def add_houses(
     district = side.district
     if not district.houses:
         return
-    walls = [scene.material(finishes.wall(rng, district.plastered)) for _ in range(integer(rng, 2, 3))]
+    walls = [
+        scene.material(street_materials.wall(rng, district.plastered)) for _ in range(integer(rng, 2, 3))
+    ]
     styles = [_sample_style(rng, scene, district, lit) for _ in range(integer(rng, 2, 3))]
     gap_m = uniform(rng, *district.gap_m)
     s, number = start_m + uniform(rng, 0.0, 8.0), 0
@@ -139,18 +143,20 @@ def _room_for(course: Course, side: Side, s_m: float, design: HouseDesign) -> tu
 
 def _sample_style(rng: np.random.Generator, scene: Assembly, district: District, lit: float) -> _Style:
     design = HouseDesign.sample(rng, choose(rng, district.houses))
-    upper = scene.material(finishes.windows(rng, design, choose(rng, finishes.WINDOW_FRAMES), lit))
-    ground = scene.material(finishes.shop_window(rng, lit)) if design.shop else upper
+    frame = choose(rng, street_materials.WINDOW_FRAMES)
+    windows = street_materials.windows(rng, design.opening, design.sill, NOMINAL_BAY_M, frame, lit)
+    upper = scene.material(windows)
+    ground = scene.material(street_materials.shop_window(rng, lit)) if design.shop else upper
     parts: list[tuple[str, MetricShape, int]] = [
-        ("trim", HouseTrim(design), scene.material(finishes.trim(rng))),
+        ("trim", HouseTrim(design), scene.material(street_materials.trim(rng))),
         ("ground floor windows", HouseWindows(design, ground=True), ground),
-        ("roof", HouseRoof(design), scene.material(finishes.roof(rng))),
+        ("roof", HouseRoof(design), scene.material(street_materials.roof(rng))),
     ]
     if design.floors > 1:
         parts.append(("windows", HouseWindows(design, ground=False), upper))
     if design.shop:
         front = replace(ShopFront.sample(rng), width=design.width, height=design.ground_floor - 0.72)
-        parts.append(("shop front", front, scene.material(finishes.shop_board(rng))))
+        parts.append(("shop front", front, scene.material(street_materials.shop_board(rng))))
     return _Style(design, HouseWalls(design), tuple(parts))
 
 
@@ -172,7 +178,7 @@ def _add_house(
     along = course.facing(s_m, side.turn_deg()).apply((design.width / 2, 0.0, 0.0))[:2]
     (origin_s, origin_t) = course.locate((middle - along)[None])[0]
     turn = side.turn_deg() + float(np.degrees(course.heading(s_m) - course.heading(float(origin_s))))
-    scene.add(*by_the_street(name, parts, course, float(origin_s), float(origin_t), turn_deg=turn))
+    scene.add(*on_course(name, parts, course, float(origin_s), float(origin_t), turn_deg=turn))
 
 
 def add_boundary(
@@ -186,13 +192,13 @@ def add_boundary(
     if kind == "hedge":
         t = side.sign * (side.edge_m + 0.5)
         shape = replace(Hedge.sample(rng, course), from_m=start_m, to_m=end_m, t_m=t)
-        material = finishes.foliage(rng)
+        material = street_materials.foliage(rng)
     else:
         t = side.sign * (side.edge_m + 0.2)
         shape = replace(Fence.sample(rng, kind, course), from_m=start_m, to_m=end_m, t_m=t)
-        material = finishes.fence(rng, kind)
-    name, worn = "fence " + "LR"[side.sign < 0], scene.material(material)
-    scene.add(standing(name, shape, worn, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
+        material = street_materials.fence(rng, kind)
+    name, index = "fence " + "LR"[side.sign < 0], scene.material(material)
+    scene.add(anchored_object(name, shape, index, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
 
 
 def add_garden(
@@ -203,17 +209,17 @@ def add_garden(
     if depth < 2.5:
         return
     kinds = [Shrub.sample(rng) for _ in range(2)]
-    leaves = scene.material(finishes.foliage(rng))
+    leaves = scene.material(street_materials.foliage(rng))
     for number in range(integer(rng, 0, 10)):
         shrub = choose(rng, kinds)
         s, t = uniform(rng, start_m, end_m), side.sign * (side.edge_m + uniform(rng, 1.3, depth - 0.9))
         name, turn = f"shrub {'LR'[side.sign < 0]}{number}", uniform(rng, 0.0, 360.0)
-        scene.add(*by_the_street(name, [("", shrub, leaves)], course, s, t, turn_deg=turn))
+        scene.add(*on_course(name, [("", shrub, leaves)], course, s, t, turn_deg=turn))
 
 
 def add_skyline(rng: np.random.Generator, scene: Assembly, course: Course, sides: tuple[Side, Side]) -> None:
     """Large plain buildings behind the rows and across the end of the street."""
-    materials = [scene.material(finishes.skyline(rng)) for _ in range(integer(rng, 2, 3))]
+    materials = [scene.material(street_materials.skyline(rng)) for _ in range(integer(rng, 2, 3))]
     far_m = course.end_m
     for number in range(integer(rng, 6, 16)):
         ahead = chance(rng, 0.35)
@@ -221,6 +227,6 @@ def add_skyline(rng: np.random.Generator, scene: Assembly, course: Course, sides
         side = choose(rng, sides)
         aside = uniform(rng, 0.0, 60.0) if ahead else side.front_m + uniform(rng, 45.0, 140.0)
         block = CityBlock.sample(rng)
-        turn, worn = uniform(rng, -30.0, 30.0), choose(rng, materials)
-        parts = [("", block, worn)]
-        scene.add(*by_the_street(f"block {number}", parts, course, s, side.sign * aside, turn_deg=turn))
+        turn, material = uniform(rng, -30.0, 30.0), choose(rng, materials)
+        parts = [("", block, material)]
+        scene.add(*on_course(f"block {number}", parts, course, s, side.sign * aside, turn_deg=turn))

@@ -1,4 +1,4 @@
-"""The stereo rig on its drive along the street."""
+"""The stereo rig and how it drives along a street."""
 
 from __future__ import annotations
 
@@ -46,6 +46,7 @@ class Drive:
     view_m: float
 
     def s(self, time_frames: float) -> float:
+        """s of the rig at an instant, metres."""
         return self.speed_m * (time_frames - (self.frames - 1) / 2)
 
     @property
@@ -60,6 +61,7 @@ class Drive:
 
 
 def sample_drive(rng: np.random.Generator, config: DrivingConfig) -> Drive:
+    """Draw the street's course, its lanes, and how the rig drives along it."""
     fast = chance(rng, config.fast_share)
     speed = uniform(rng, *(config.fast_m if fast else config.slow_m))
     backwards = chance(rng, config.backwards_share)
@@ -90,7 +92,10 @@ def sample_drive(rng: np.random.Generator, config: DrivingConfig) -> Drive:
 
 
 def sample_camera(rng: np.random.Generator, config: DrivingConfig, drive: Drive) -> StereoCamera:
-    """A camera on its drive; the baseline is small enough for the road to keep within the disparities allowed."""
+    """Draw the rig's camera, moving along the drive.
+
+    Its baseline is so small that the road keeps within the largest disparity allowed.
+    """
     focal_mm = choose(rng, config.focal_lengths_mm)
     height_m, pitch = uniform(rng, *config.camera_height_m), uniform(rng, *config.pitch_deg)
     roll, yaw = uniform(rng, *config.roll_deg), uniform(rng, *config.yaw_deg)

@@ -1,4 +1,4 @@
-"""What stands and walks on the pavements: lamps, trees, signs, furniture, people."""
+"""Things on the pavements: lamps, trees, signs, furniture, people."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.placement.assembly import Assembly, by_the_street
+from scenes.appearance import street_materials
+from scenes.placement.assembly import Assembly, anchored_object
 from scenes.random_draws import chance, choose, integer, uniform
-from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.anchored import MetricShape
 from scenes.shapes.street.furniture import (
     Bench,
     Bollard,
@@ -27,7 +28,7 @@ from scenes.shapes.street.furniture import (
 from scenes.shapes.street.pedestrians import PersonDesign, PersonHair, PersonLegs, PersonSkin, PersonTop
 from scenes.shapes.street.roadside_plants import TreeCrown, TreeDesign, TreeStem
 from scenes.spec import AreaLight
-from scenes.streets import materials as finishes
+from scenes.streets.along_course import on_course
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive
@@ -37,18 +38,21 @@ _Parts = list[tuple[str, MetricShape, int]]
 _FINE_M = 45.0
 """Trees farther along the street than this have fewer leaves."""
 _LAMPS_LIT = 5
-"""Street lamps that shine: those nearest to the rig; the others' light would hardly be seen."""
+"""How many street lamps give light: those nearest to the rig. The others' light would hardly be seen."""
 
 
 class Pavement:
-    """The free places of one pavement: nothing is put where something stands."""
+    """One pavement and which of its places are taken."""
 
     def __init__(self, side: Side) -> None:
         self.side = side
         self._taken: list[tuple[float, float, float, float]] = []
 
-    def free(self, s_m: float, t_m: float, reach_m: float, travel_m: float = 0.0) -> bool:
-        """Whether a disc is free, and the way it moves to and fro along the street; if so both are taken."""
+    def take(self, s_m: float, t_m: float, reach_m: float, travel_m: float = 0.0) -> bool:
+        """Take a disc of radius `reach_m` at (s, t) if it is free; False if it is not.
+
+        The disc moves by up to `travel_m` along the street either way.
+        """
         for s, t, reach, travel in self._taken:
             apart = max(abs(s - s_m) - travel - travel_m, 0.0)
             if math.hypot(apart, t - t_m) < reach + reach_m:
@@ -57,16 +61,20 @@ class Pavement:
         return True
 
     def near_kerb(self, metres: float) -> float:
+        """t at a distance from the kerb."""
         return self.side.sign * (self.side.kerb_m + metres)
 
     def near_wall(self, metres: float) -> float:
+        """t at a distance from the pavement's far edge."""
         return self.side.sign * (self.side.edge_m - metres)
 
     @property
     def width_m(self) -> float:
+        """From the kerb to the far edge."""
         return self.side.edge_m - self.side.kerb_m
 
     def name(self, what: str, number: int) -> str:
+        """A name for a thing on this pavement, different on both."""
         return f"{what} {'LR'[self.side.sign < 0]}{number}"
 
 
@@ -81,9 +89,9 @@ def add_lamps(
 ) -> list[AreaLight]:
     """Rows of lamp posts of one design; returns the light of those nearest to the rig when they are lit."""
     design = LampDesign.sample(rng)
-    post = scene.material(finishes.metal_paint(rng))
+    post = scene.material(street_materials.metal_paint(rng))
     glow = uniform(rng, 12.0, 30.0) if lit else 0.0
-    glass = scene.material(finishes.lamp((255, 226, 190) if lit else (225, 226, 220), glow))
+    glass = scene.material(street_materials.lamp((255, 226, 190) if lit else (225, 226, 220), glow))
     parts: _Parts = [("post", LampPost(design), post), ("light", LampLight(design), glass)]
     spacing = uniform(rng, *config.lamp_spacing_m)
     rows = pavements if chance(rng, 0.6) else (choose(rng, pavements),)
@@ -92,11 +100,11 @@ def add_lamps(
         s, number = drive.course.start_m + uniform(rng, 2.0, spacing), 0
         while s < drive.course.end_m - 2.0:
             t = pavement.near_kerb(0.5)
-            pavement.free(s, t, 0.4)
+            pavement.take(s, t, 0.4)
             # The arm's x axis points over the street.
             turn = -90.0 if pavement.side.sign > 0 else 90.0
             scene.add(
-                *by_the_street(
+                *on_course(
                     pavement.name("lamp", number), parts, drive.course, s, t, turn_deg=turn, z_m=ground_m
                 )
             )
@@ -133,7 +141,7 @@ def add_trees(
     ground_m: float,
 ) -> None:
     """A row of trees on the pavement, some in front gardens, in parks several rows."""
-    leaves, bark = scene.material(finishes.foliage(rng)), scene.material(finishes.bark(rng))
+    leaves, bark = scene.material(street_materials.foliage(rng)), scene.material(street_materials.bark(rng))
     kinds = [_tree_parts(TreeDesign.sample(rng), leaves, bark) for _ in range(2)]
     park = not pavement.side.district.houses
     depth = pavement.side.front_m - pavement.side.edge_m
@@ -152,9 +160,9 @@ def add_trees(
             t = pavement.near_wall(-behind)
             near, far = choose(rng, kinds)
             name, turn = pavement.name(f"tree {row}", number), uniform(rng, 0.0, 360.0)
-            if pavement.free(at, t, 0.7):
+            if pavement.take(at, t, 0.7):
                 parts = far if at > _FINE_M else near
-                scene.add(*by_the_street(name, parts, drive.course, at, t, turn_deg=turn, z_m=ground_m))
+                scene.add(*on_course(name, parts, drive.course, at, t, turn_deg=turn, z_m=ground_m))
             s += spacing
             number += 1
 
@@ -209,12 +217,15 @@ def add_furniture(
         for k in range(integer(rng, 3, 8) if piece.row_m else 1):
             at = s + k * piece.row_m
             name = pavement.name(piece.name, number) + (f".{k}" if piece.row_m else "")
-            if pavement.free(at, t, piece.reach_m):
-                scene.add(*by_the_street(name, piece.parts, course, at, t, turn_deg=turn, z_m=ground_m))
+            if pavement.take(at, t, piece.reach_m):
+                scene.add(*on_course(name, piece.parts, course, at, t, turn_deg=turn, z_m=ground_m))
 
 
 def _sample_pieces(rng: np.random.Generator, scene: Assembly, pavement: Pavement) -> list[_Piece]:
-    grey, wooden = scene.material(finishes.metal_paint(rng)), scene.material(finishes.wood(rng))
+    grey, wooden = (
+        scene.material(street_materials.metal_paint(rng)),
+        scene.material(street_materials.wood(rng)),
+    )
     facing = pavement.side.turn_deg() + 180.0
     pieces = [
         _Piece("bollard", 0.2, [("", Bollard.sample(rng), grey)], 0.2, from_kerb_m=0.4, row_m=1.5),
@@ -226,7 +237,7 @@ def _sample_pieces(rng: np.random.Generator, scene: Assembly, pavement: Pavement
     ]
     for _ in range(3):
         post = SignPost.sample(rng)
-        face = scene.material(finishes.sign_face(rng, post.corners))
+        face = scene.material(street_materials.sign_face(rng, post.corners))
         parts: _Parts = [("post", post, grey), ("face", SignFace(post), face)]
         pieces.append(_Piece("sign", 0.12, parts, 0.4, from_kerb_m=0.5, turn_deg=180.0))
     if pavement.width_m > 2.6:
@@ -247,9 +258,9 @@ def add_traffic_lights(
     if not crossings or chance(rng, 0.5):
         return
     light = TrafficLight.sample(rng)
-    post = scene.material(finishes.black_plastic())
+    post = scene.material(street_materials.black_plastic())
     green = chance(rng, 0.5)
-    lens = scene.material(finishes.lamp((40, 230, 120) if green else (250, 30, 24), 2.5))
+    lens = scene.material(street_materials.lamp((40, 230, 120) if green else (250, 30, 24), 2.5))
     parts: _Parts = [
         ("post", light, post),
         ("lens", TrafficLightLens(light, green), lens),
@@ -260,14 +271,14 @@ def add_traffic_lights(
             ahead = (pavement.side.sign > 0) == drive.keep_left
             s = crossing + (-2.6 if ahead else 2.6)
             t = pavement.near_kerb(0.45)
-            pavement.free(s, t, 0.3)
+            pavement.take(s, t, 0.3)
             # Its arm is along y: over the street when the light is turned towards its traffic.
             turn = 180.0 if ahead else 0.0
             over = 1.0 if (turn == 0.0) == (pavement.side.sign < 0) else -1.0
             if over < 0 and light.reach:
                 continue
             scene.add(
-                *by_the_street(
+                *on_course(
                     pavement.name("traffic light", number),
                     parts,
                     drive.course,
@@ -300,7 +311,7 @@ def add_people(
         parts = wardrobe.dressed(rng)
         travel = abs(walk) * (drive.frames + 1) / 2
         inside = course.start_m + 1.0 < s - travel and s + travel < course.end_m - 1.0
-        if not inside or not pavement.free(s, t, 0.35, travel):
+        if not inside or not pavement.take(s, t, 0.35, travel):
             continue
         count = 2 + math.floor(2 * travel / 4.0) if walk else 1
         times = np.linspace(-1.0, float(drive.frames), count).tolist() if walk else [0.0]
@@ -310,7 +321,10 @@ def add_people(
         turns = [course.facing(at, turn) for at in track]
         name = pavement.name("person", number)
         scene.add(
-            *(standing(f"{name} {part}", shape, worn, places, turns, times) for part, shape, worn in parts)
+            *(
+                anchored_object(f"{name} {part}", shape, material, places, turns, times)
+                for part, shape, material in parts
+            )
         )
 
 
@@ -320,9 +334,9 @@ class _Wardrobe:
     def __init__(self, rng: np.random.Generator, scene: Assembly) -> None:
         designs = [PersonDesign.sample(rng) for _ in range(3)]
         self.bodies = [(PersonTop(d), PersonLegs(d), PersonSkin(d), PersonHair(d)) for d in designs]
-        self.clothes = [scene.material(finishes.cloth(rng)) for _ in range(6)]
-        self.skins = [scene.material(finishes.skin(rng)) for _ in range(2)]
-        self.hairs = [scene.material(finishes.hair(rng)) for _ in range(2)]
+        self.clothes = [scene.material(street_materials.cloth(rng)) for _ in range(6)]
+        self.skins = [scene.material(street_materials.skin(rng)) for _ in range(2)]
+        self.hairs = [scene.material(street_materials.hair(rng)) for _ in range(2)]
 
     def dressed(self, rng: np.random.Generator) -> _Parts:
         top, legs, skin, hair = choose(rng, self.bodies)

@@ -1,4 +1,4 @@
-"""The ground: carriageway, paint, kerbs, pavements, gardens, the land beyond."""
+"""The ground of a street: carriageway, markings, kerbs, pavements, gardens, the land beyond."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.placement.assembly import Assembly
+from scenes.appearance import street_materials
+from scenes.placement.assembly import Assembly, anchored_object
 from scenes.random_draws import chance, integer, uniform
-from scenes.shapes.metric import MetricShape, standing
-from scenes.shapes.street.road import Course, Field, Kerb, RoadPaint, RoadStrip, Stripe
-from scenes.streets import materials as finishes
+from scenes.shapes.anchored import MetricShape
+from scenes.shapes.street.road import Course, Kerb, LevelGround, RoadMarkings, RoadStrip, Stripe
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive
@@ -22,7 +22,7 @@ _LAND_M = 900.0
 
 @dataclass(frozen=True)
 class Ground:
-    """What the rest of the scene needs to know of the ground."""
+    """Measures of the ground that other parts of the scene need."""
 
     crossings: tuple[float, ...]
     """s of the middles of the zebra crossings."""
@@ -33,13 +33,13 @@ class Ground:
 def lay_ground(
     rng: np.random.Generator, scene: Assembly, config: DrivingConfig, drive: Drive, sides: tuple[Side, Side]
 ) -> Ground:
-    """Everything underfoot."""
+    """Add all surfaces of the ground."""
     course = drive.course
     left, right = sides
     road = (left.kerb_m, -right.kerb_m, uniform(rng, 0.0, 0.06))
     kerb_height = uniform(rng, *config.kerb_m)
     crossings = _crossings(rng)
-    tarmac = scene.material(finishes.asphalt(rng))
+    tarmac = scene.material(street_materials.asphalt(rng))
     _lay(
         scene,
         "road",
@@ -48,8 +48,11 @@ def lay_ground(
     )
     _paint(rng, scene, drive, road, crossings)
     _repairs(rng, scene, course, road)
-    stone, paving = scene.material(finishes.kerb_stone(rng)), scene.material(finishes.pavement(rng))
-    lawn = scene.material(finishes.grass(rng))
+    stone, paving = (
+        scene.material(street_materials.kerb_stone(rng)),
+        scene.material(street_materials.pavement(rng)),
+    )
+    lawn = scene.material(street_materials.grass(rng))
     for side in sides:
         name = "left" if side.sign > 0 else "right"
         width = uniform(rng, 0.12, 0.3) * side.sign
@@ -65,13 +68,13 @@ def lay_ground(
             _strip(course, outer - 0.05 * side.sign, reach, top - 0.02),
             _land(rng, side, lawn, paving),
         )
-    _lay(scene, "plain", Field(course.start_m - _LAND_M, course.end_m + _LAND_M, _LAND_M, -0.3), lawn)
+    _lay(scene, "plain", LevelGround(course.start_m - _LAND_M, course.end_m + _LAND_M, _LAND_M, -0.3), lawn)
     return Ground(crossings, kerb_height - 0.006)
 
 
 def _lay(scene: Assembly, name: str, shape: MetricShape, material: int) -> None:
     """A shape whose coordinates are the world's."""
-    scene.add(standing(name, shape, material, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
+    scene.add(anchored_object(name, shape, material, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
 
 
 def _strip(course: Course, one_m: float, other_m: float, top_m: float) -> RoadStrip:
@@ -122,16 +125,16 @@ def _paint(
     for middle in crossings:
         stripes += _zebra(rng, drive, road, middle)
     yellow = chance(rng, 0.25)
-    white = scene.material(finishes.road_paint(rng))
+    white = scene.material(street_materials.road_paint(rng))
     centre = [piece for stripe in centre for piece in _interrupted(stripe, crossings)]
     stripes = [piece for stripe in stripes for piece in _interrupted(stripe, crossings)]
     groups = [
-        ("centre line", centre, scene.material(finishes.road_paint(rng, True)) if yellow else white),
+        ("centre line", centre, scene.material(street_materials.road_paint(rng, True)) if yellow else white),
         ("markings", stripes, white),
     ]
     for name, items, material in groups:
         if items:
-            _lay(scene, name, RoadPaint(course, tuple(items), road), material)
+            _lay(scene, name, RoadMarkings(course, tuple(items), road), material)
 
 
 def _dashes(course: Course, t_m: float, half_m: float, dash_m: float, gap_m: float) -> list[Stripe]:
@@ -190,5 +193,5 @@ def _repairs(
         )
         patches.append(Stripe(s, s + long, t + wide, t - wide, shear=uniform(rng, -0.2, 0.2)))
     if patches:
-        shape = RoadPaint(course, tuple(patches), road, thickness_m=0.003)
-        _lay(scene, "repairs", shape, scene.material(finishes.tarmac_patch(rng)))
+        shape = RoadMarkings(course, tuple(patches), road, thickness_m=0.003)
+        _lay(scene, "repairs", shape, scene.material(street_materials.tarmac_patch(rng)))

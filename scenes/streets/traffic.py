@@ -9,16 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from scenes.appearance import street_materials
+from scenes.appearance.materials import plain
 from scenes.appearance.painting import Srgb, shade
-from scenes.placement.assembly import Assembly
+from scenes.placement.assembly import Assembly, anchored_object
 from scenes.random_draws import chance, choose, uniform
-from scenes.shapes.metric import MetricShape, standing
+from scenes.shapes.anchored import MetricShape
 from scenes.shapes.street.cars import CarBody, CarDesign, CarGlass, CarLamps, CarTrim
 from scenes.shapes.street.road import Course
 from scenes.shapes.street.vans import CargoBox, VanBody, VanDesign, VanGlass, VanLamps, VanTrim
 from scenes.shapes.street.wheels import MIRROR_M, Wheel, WheelSet
 from scenes.spec import SceneObject
-from scenes.streets import materials as finishes
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive, Lane
@@ -30,20 +31,20 @@ _KEY_M = 4.0
 _TURN_KEY = 2.0
 """Key poses of a turning wheel are at most this far apart, radians."""
 _FINE_M = 40.0
-"""Standing vehicles farther along the street than this have coarser wheels."""
+"""PartedShape vehicles farther along the street than this have coarser wheels."""
 _CAR_KINDS = ("hatchback", "hatchback", "saloon", "estate", "suv", "suv")
 
 
 @dataclass(frozen=True)
 class Model:
-    """A make of vehicle: its parts with the materials all of its kind share, its wheels."""
+    """A model of vehicle: its parts, with the materials that all its vehicles share, and its wheels."""
 
     length: float
     half_width: float
     """With the mirrors."""
     parts: tuple[tuple[str, MetricShape, int], ...]
     painted: tuple[tuple[str, MetricShape], ...]
-    """Parts that wear each vehicle's own paint."""
+    """Parts that have each vehicle's own paint."""
     wheel: Wheel
     wheel_material: int
     wheels: tuple[tuple[float, float], ...]
@@ -55,24 +56,26 @@ class Model:
 
 @dataclass
 class Fleet:
-    """The makes of vehicle a scene has; few, so that they share their meshes."""
+    """The models of vehicles in a scene; few, so that vehicles share their meshes."""
 
     cars: list[Model]
     large: list[Model]
     large_share: float
 
     def draw(self, rng: np.random.Generator) -> Model:
+        """A random model; a large one in `large_share` of the draws."""
         return choose(rng, self.large if self.large and chance(rng, self.large_share) else self.cars)
 
 
 def sample_fleet(rng: np.random.Generator, scene: Assembly, config: DrivingConfig, lit: bool) -> Fleet:
+    """Draw the models of vehicles of a scene; `lit` switches their lamps on."""
     shared = {
-        "glass": scene.material(finishes.car_glass(rng)),
-        "trim": scene.material(finishes.black_plastic()),
-        "head": scene.material(finishes.lamp((235, 240, 245), 4.0 if lit else 0.0)),
-        "tail": scene.material(finishes.lamp((170, 16, 18), 1.5 if lit else 0.0)),
+        "glass": scene.material(street_materials.car_glass(rng)),
+        "trim": scene.material(street_materials.black_plastic()),
+        "head": scene.material(street_materials.lamp((235, 240, 245), 4.0 if lit else 0.0)),
+        "tail": scene.material(street_materials.lamp((170, 16, 18), 1.5 if lit else 0.0)),
     }
-    paints = [scene.material(finishes.car_paint(rng)) for _ in range(9)]
+    paints = [scene.material(street_materials.car_paint(rng)) for _ in range(9)]
     cars = [_car_model(rng, scene, shared, paints) for _ in range(4)]
     kinds = choose(rng, [("van", "lorry"), ("van", "bus"), ("lorry", "bus"), ("van", "van")])
     large = [_van_model(rng, scene, shared, paints, kind) for kind in kinds]
@@ -94,7 +97,7 @@ def _car_model(rng: np.random.Generator, scene: Assembly, shared: dict[str, int]
         ),
         painted=(("body", CarBody(design)),),
         wheel=wheel,
-        wheel_material=scene.material(finishes.wheel(rng, wheel.radius, wheel.width)),
+        wheel_material=scene.material(street_materials.wheel(rng, wheel.radius, wheel.width)),
         wheels=wheels,
         wheel_sets=(WheelSet(wheel, wheels), WheelSet(replace(wheel, sides=12), wheels)),
         paint=lambda rng: choose(rng, paints),
@@ -115,18 +118,18 @@ def _van_model(
     ]
     own = list(paints)
     if kind == "lorry":
-        parts.append(("box", CargoBox(design), scene.material(finishes.lettering(rng, _livery(rng)))))
+        parts.append(("box", CargoBox(design), scene.material(street_materials.lettering(rng, _livery(rng)))))
     elif kind == "bus" or chance(rng, 0.4):
-        own = [scene.material(finishes.lettering(rng, _livery(rng)))]
+        own = [scene.material(street_materials.lettering(rng, _livery(rng)))]
     elif chance(rng, 0.5):
-        own = [scene.material(finishes.plain((228, 228, 224), roughness=0.25, specular=0.5))]
+        own = [scene.material(plain((228, 228, 224), roughness=0.25, specular=0.5))]
     return Model(
         length=design.length,
         half_width=design.width / 2 + MIRROR_M,
         parts=tuple(parts),
         painted=(("body", VanBody(design)),),
         wheel=wheel,
-        wheel_material=scene.material(finishes.wheel(rng, wheel.radius, wheel.width)),
+        wheel_material=scene.material(street_materials.wheel(rng, wheel.radius, wheel.width)),
         wheels=wheels,
         wheel_sets=(WheelSet(wheel, wheels), WheelSet(replace(wheel, sides=12), wheels)),
         paint=lambda rng: choose(rng, own),
@@ -143,7 +146,7 @@ def _livery(rng: np.random.Generator) -> Srgb:
 
 
 def vehicle_of(name: str) -> str:
-    """The vehicle a part's name speaks of: "parked L3 head lamps" is of "parked L3"."""
+    """Name of the vehicle that a part belongs to: "parked L3" for the part "parked L3 head lamps"."""
     return " ".join(name.split()[:2])
 
 
@@ -166,11 +169,12 @@ def _vehicle(
     paint = model.paint(rng)
     parts = [*model.parts, *[(part, shape, paint) for part, shape in model.painted]]
     objects = [
-        standing(f"{name} {part}", shape, material, places, turns, times) for part, shape, material in parts
+        anchored_object(f"{name} {part}", shape, material, places, turns, times)
+        for part, shape, material in parts
     ]
     if len(times) == 1:
         wheels = model.wheel_sets[abs(s_m[0]) > _FINE_M]
-        objects.append(standing(f"{name} wheels", wheels, model.wheel_material, places, turns))
+        objects.append(anchored_object(f"{name} wheels", wheels, model.wheel_material, places, turns))
         return tuple(objects)
     forward = 1.0 if turn_deg == 0.0 else -1.0
     start = uniform(rng, 0.0, 2 * math.pi)
@@ -185,7 +189,9 @@ def _vehicle(
             spots.append((float(hub[0]), float(hub[1]), float(hub[2])))
             attitudes.append(facing * Rotation.from_euler("Y", angle))
         objects.append(
-            standing(f"{name} wheel {number}", model.wheel, model.wheel_material, spots, attitudes, rolled[0])
+            anchored_object(
+                f"{name} wheel {number}", model.wheel, model.wheel_material, spots, attitudes, rolled[0]
+            )
         )
     return tuple(objects)
 
@@ -206,7 +212,7 @@ def _rolling(
 def add_moving(
     rng: np.random.Generator, scene: Assembly, config: DrivingConfig, drive: Drive, fleet: Fleet
 ) -> None:
-    """Vehicles in all lanes, those of a lane at one speed, so that they keep their distances."""
+    """Vehicles in all lanes; those of one lane have one speed, so that they keep their distances."""
     for number, lane in enumerate(drive.lanes):
         own = lane == drive.lane
         speed = (

@@ -1,4 +1,4 @@
-"""Texture generators, a module a kind of picture. A new `Texture` subclass in a module here is found by itself."""
+"""Texture generators, by kind of image. A new `Texture` subclass in a module here needs no registration."""
 
 import sys
 

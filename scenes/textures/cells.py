@@ -1,4 +1,4 @@
-"""Pictures divided into irregular cells: mosaics, cobblestones, cracked mud, scales."""
+"""Cellular patterns: mosaics, cobblestones, cracked mud, scales."""
 
 from __future__ import annotations
 
@@ -28,13 +28,14 @@ from scenes.random_draws import integer, new_seed, uniform
 from scenes.spec import Texture
 
 
-def nearest_seeds(
+def cellular_noise(
     rng: np.random.Generator, x: Field, y: Field, cells: int, jitter: float
 ) -> tuple[NDArray[np.int32], Field, Field]:
-    """Worley's cellular noise on a periodic jittered grid of cells x cells points.
+    """Cellular noise on a periodic jittered grid of cells x cells points (Worley 1996).
 
-    Returns the index of the nearest point, the distance to it and that to the second nearest, in grid
-    steps. Only the 3 x 3 neighbouring grid cells are searched.
+    `x`, `y` (H, W) are places in pictures, of period 1; `jitter` is 0 for a square grid, 1 for a random one.
+    Returns, (H, W) each, the index of the nearest point, the distance to it and that to the second nearest, in
+    grid steps. Only the 3 x 3 neighbouring cells are searched.
     """
     points = 0.5 + jitter * rng.uniform(-0.5, 0.5, (2, cells, cells))
     # Absolute positions with a margin of one cell on every side, so that neighbours need no wrapping.
@@ -51,7 +52,7 @@ def nearest_seeds(
 
 @dataclass(frozen=True)
 class VoronoiCells(Texture):
-    """Cells of flat but varied colour between joints: mosaics, terrazzo, giraffes, dry earth."""
+    """Voronoi cells of different colours between joints: mosaics, terrazzo, giraffes, dry earth."""
 
     size: int
     seed: int
@@ -64,7 +65,7 @@ class VoronoiCells(Texture):
     joint_width: float
     """In cells; 0 for none."""
     warp: float
-    """Waviness of the joints in cells."""
+    """Amplitude of the joints' waves, in cells."""
     grain: float
 
     @classmethod
@@ -88,7 +89,7 @@ class VoronoiCells(Texture):
         bend = np.float32(self.warp / self.cells)
         x = x + bend * spectral_noise(rng, self.size, 1.5, self.cells / 2)
         y = y + bend * spectral_noise(rng, self.size, 1.5, self.cells / 2)
-        nearest, first, second = nearest_seeds(rng, x, y, self.cells, self.jitter)
+        nearest, first, second = cellular_noise(rng, x, y, self.cells, self.jitter)
         place = rng.uniform(0.0, 1.0, self.cells**2).astype(np.float32)[nearest]
         picture = colorize(place, self.palette)
         picture = picture * (1 + np.float32(0.12) * spectral_noise(rng, self.size, 0.9, 3))
@@ -130,7 +131,7 @@ class Cobblestones(Texture):
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
         x, y = unit_grid(self.size)
-        nearest, first, second = nearest_seeds(rng, x, y, self.cells, self.jitter)
+        nearest, first, second = cellular_noise(rng, x, y, self.cells, self.jitter)
         gap = second - first
         height = np.tanh(gap * np.float32(2.5)) - np.float32(self.roundness) * first**2
         slope_x = np.roll(height, -1, 1) - np.roll(height, 1, 1)

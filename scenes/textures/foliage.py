@@ -1,4 +1,4 @@
-"""Textures of plants, drawn to scale: leaves, lawns, bark."""
+"""Plants at a fixed scale, for streets: leaves, lawns, bark."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from scenes.appearance.painting import (
 )
 from scenes.random_draws import chance, integer, new_seed, uniform
 from scenes.spec import Texture
-from scenes.textures.cells import nearest_seeds
+from scenes.textures.cells import cellular_noise
 
 
 @dataclass(frozen=True)
 class Foliage(Texture):
-    """Leaves in all directions, light ones over dark ones."""
+    """A dense cover of light and dark leaves."""
 
     size: int
     seed: int
@@ -52,7 +52,7 @@ class Foliage(Texture):
     def image(self) -> NDArray[np.uint8]:
         rng = np.random.default_rng(self.seed)
         x, y = unit_grid(self.size)
-        nearest, first, second = nearest_seeds(rng, x, y, self.leaves, 1.0)
+        nearest, first, second = cellular_noise(rng, x, y, self.leaves, 1.0)
         tone = rng.uniform(0.0, 1.0, self.leaves**2).astype(np.float32)[nearest]
         clumps = np.float32(0.18) * spectral_noise(rng, self.size, 1.2, 2)
         edge = smooth_step(second - first, 0.08, 0.2)
@@ -64,7 +64,7 @@ class Foliage(Texture):
 
 @dataclass(frozen=True)
 class Grass(Texture):
-    """Mown lawn, meadow or bare earth between."""
+    """Lawn or meadow, with dry patches."""
 
     size: int
     seed: int
@@ -91,7 +91,7 @@ class Grass(Texture):
 
 @dataclass(frozen=True)
 class Bark(Texture):
-    """Ridges along the stem."""
+    """Bark with ridges along the stem."""
 
     size: int
     seed: int

@@ -1,4 +1,4 @@
-"""Textures of houses, drawn to scale: plaster, windows, roofs."""
+"""Houses at a fixed scale, for streets: plaster, windows, roofs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from scenes.spec import Texture
 
 @dataclass(frozen=True)
 class Plaster(Texture):
-    """Rendered or painted wall, concrete, sandstone: one colour, clouds, streaks that rain has left."""
+    """Plaster, painted walls, concrete: one colour with clouds and streaks of rain."""
 
     size: int
     seed: int
@@ -63,9 +63,9 @@ class Plaster(Texture):
 
 @dataclass(frozen=True)
 class WindowPanes(Texture):
-    """What is behind a wall's openings: frames, dark glass, curtains, blinds, lit rooms.
+    """Windows as seen in a wall's openings: frames, dark glass, curtains, blinds, lit rooms.
 
-    A grid of cells, one a bay and floor of the wall; each opening shows the middle of its cell.
+    The picture is a grid of cells, one for each bay of each floor; an opening shows the middle of its cell.
     """
 
     size: int
@@ -133,7 +133,7 @@ class WindowPanes(Texture):
         return finish(picture, rng, 0.04)
 
     def _covered(self, picture: Picture, a: Field, b: Field, room: Field) -> Picture:
-        """Curtains to the sides, or a blind let down part of the way."""
+        """The picture with curtains at the sides, or a blind lowered part of the way."""
         dressed = room[1] < self.curtains
         tone = colorize(room[3], ((238, 234, 222), (225, 214, 190), (190, 190, 196), (150, 120, 100)))
         folds = np.float32(0.85) + np.float32(0.15) * np.sin(a * np.float32(60))

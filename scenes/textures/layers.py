@@ -1,4 +1,4 @@
-"""Pictures made of other pictures."""
+"""Pictures composed of other pictures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scenes.appearance.painting import mix, smooth_step, spectral_noise, to_bytes
 from scenes.random_draws import chance, choose, log_uniform, new_seed, uniform
 from scenes.spec import Texture
-from scenes.textures import cells, marks, noise, plain, tiles
+from scenes.textures import cells, collages, noise, plain, tiles
 
 _GROUNDS: list[type[Texture]] = [
     noise.FractalNoise,
@@ -23,8 +23,8 @@ _GROUNDS: list[type[Texture]] = [
     tiles.Bricks,
     tiles.Checkers,
     tiles.Weave,
-    marks.DeadLeaves,
-    marks.Facade,
+    collages.DeadLeaves,
+    collages.Facade,
     plain.Gradient,
 ]
 _COVERS: list[type[Texture]] = [
@@ -34,9 +34,9 @@ _COVERS: list[type[Texture]] = [
     cells.VoronoiCells,
     tiles.Stripes,
     tiles.Dots,
-    marks.DeadLeaves,
-    marks.BlurredShapes,
-    marks.GlyphRows,
+    collages.DeadLeaves,
+    collages.BlurredShapes,
+    collages.GlyphRows,
     plain.NearTextureless,
 ]
 

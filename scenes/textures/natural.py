@@ -1,4 +1,4 @@
-"""Pictures of living and weathered stuff: bark, litter, layered rock, hair, leaf veins, eyes."""
+"""Natural surfaces: bark, litter, layered rock, hair, leaf veins, eyes."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from scenes.spec import Texture
 
 @dataclass(frozen=True)
 class RoughBark(Texture):
-    """Upright ridges with dark cracks between them, patches of lichen: trunks, weathered timber."""
+    """Upright ridges with dark cracks between them and patches of lichen: trunks, weathered timber."""
 
     size: int
     seed: int
     palette: Palette
-    """Crack to ridge."""
+    """From cracks to ridges."""
     lichen: Srgb
     lichen_cover: float
     """0..1."""
     cycles: float
     """Ridges across the picture."""
     stretch: float
-    """How much longer than wide the ridges are."""
+    """Length to width of the ridges."""
     grain: float
 
     popularity: ClassVar[float] = 0.5
@@ -52,6 +52,7 @@ class RoughBark(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette, lichen: Srgb) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),
@@ -79,12 +80,12 @@ class RoughBark(Texture):
 
 @dataclass(frozen=True)
 class Litter(Texture):
-    """Short strokes lying over one another in all directions: grass from above, fallen leaves, straw, moss."""
+    """Short strokes over one another in all directions: grass from above, fallen leaves, straw, moss."""
 
     size: int
     seed: int
     palette: Palette
-    """From what lies deepest to what lies on top."""
+    """From the lowest to the topmost layer."""
     length_px: float
     aspect: float
     """Length to width of a stroke."""
@@ -101,6 +102,7 @@ class Litter(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),
@@ -113,7 +115,7 @@ class Litter(Texture):
         )
 
     def image(self) -> NDArray[np.uint8]:
-        """Each layer stamps one stroke a grid cell, so that all of it is array arithmetic."""
+        """Paint layers of strokes; each layer is one operation on arrays."""
         rng = np.random.default_rng(self.seed)
         tone = np.float32(0.15) + np.float32(0.1) * spectral_noise(rng, self.size, 1.0, 3)
         for layer in range(self.layers):
@@ -147,7 +149,7 @@ class Litter(Texture):
 
 @dataclass(frozen=True)
 class Strata(Texture):
-    """Layered, cracked and stained rock, with moss, sand or snow caught in its hollows."""
+    """Layered, cracked and stained rock, with moss, sand or snow in its hollows."""
 
     size: int
     seed: int
@@ -158,7 +160,7 @@ class Strata(Texture):
     layers: int
     """Layers per picture; 0 for massive rock."""
     bend: float
-    """Waviness of the layers in layers."""
+    """Amplitude of the layers' waves, in layers."""
     cracks: float
     """Strength of dark cracks, 0..1."""
     slope: float
@@ -173,6 +175,7 @@ class Strata(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette, dust: Srgb) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),
@@ -205,7 +208,7 @@ class Strata(Texture):
 
 @dataclass(frozen=True)
 class Hair(Texture):
-    """Combed strands with spots or bands of another colour: fur, hair, dry grass, thatch."""
+    """Combed strands, some with spots or bands of another colour: fur, hair, dry grass, thatch."""
 
     size: int
     seed: int
@@ -227,6 +230,7 @@ class Hair(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette, marking: Srgb) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),
@@ -253,7 +257,7 @@ class Hair(Texture):
 
 @dataclass(frozen=True)
 class LeafVeins(Texture):
-    """The flesh of leaves: blotches, a net of pale veins, brown edges here and there."""
+    """The surface of leaves: blotches, a net of pale veins, brown blemishes."""
 
     size: int
     seed: int
@@ -273,6 +277,7 @@ class LeafVeins(Texture):
 
     @classmethod
     def of(cls, rng: np.random.Generator, size: int, palette: Palette, vein: Srgb) -> Self:
+        """A random instance in given colours."""
         return cls(
             size=size,
             seed=new_seed(rng),
@@ -302,7 +307,7 @@ class LeafVeins(Texture):
 
 @dataclass(frozen=True)
 class Iris(Texture):
-    """An eye about the picture's corner: pupil, streaked iris with a dark rim, veined white."""
+    """An eye centred on the picture's corner: pupil, streaked iris with a dark rim, veined white."""
 
     size: int
     seed: int

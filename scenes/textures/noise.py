@@ -1,4 +1,4 @@
-"""Pictures made of filtered noise: clouds, stone, rust, labyrinths, marble, wood."""
+"""Filtered noise: clouds, stone, rust, labyrinths, marble, wood."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from scenes.spec import Texture
 
 @dataclass(frozen=True)
 class FractalNoise(Texture):
-    """1/f noise coloured by a palette: clouds, stone, soil, foliage from afar."""
+    """1/f noise coloured by a palette: clouds, stone, soil, distant foliage."""
 
     size: int
     seed: int
@@ -38,7 +38,7 @@ class FractalNoise(Texture):
     low_cycles: float
     """Coarsest structures per picture."""
     ridges: bool
-    """Whether the noise is folded at its middle, which makes veins and ridges."""
+    """Whether the absolute value of the noise is taken, which makes veins and ridges."""
     grain: float
 
     popularity: ClassVar[float] = 1.5
@@ -100,20 +100,20 @@ class NaturalSpectrum(Texture):
 
 @dataclass(frozen=True)
 class Labyrinth(Texture):
-    """Spots and labyrinths as reaction and diffusion make them: noise of one wavelength, sharpened.
+    """Spots and labyrinths like those of reaction-diffusion systems: thresholded noise of one wavelength.
 
-    A threshold of ring-shaped band-pass noise is the fixed point of a Turing system's early growth
-    (A. Turing, "The chemical basis of morphogenesis", 1952); iterating filter and squashing grows it further.
+    The early growth of such a system amplifies noise in a narrow band of wavelengths (A. Turing, "The chemical
+    basis of morphogenesis", 1952).
     """
 
     size: int
     seed: int
     palette: Palette
-    """Ground and figure."""
+    """Two colours of the ground, one of the pattern."""
     cycles: float
     """Wavelengths per picture."""
     balance: float
-    """-1..1: spots, labyrinth, holes."""
+    """-1..1: from holes in the pattern over a labyrinth to single spots."""
     stretch: tuple[float, float]
     """Elongation along x and y."""
     grain: float
@@ -135,11 +135,11 @@ class Labyrinth(Texture):
         rng = np.random.default_rng(self.seed)
         band = spectral_noise(rng, self.size, 0.0, self.cycles * 0.8, self.cycles * 1.2, self.stretch)
         band = band + np.float32(0.2) * spectral_noise(rng, self.size, 1.0, self.cycles)
-        figure = smooth_step(band, self.balance, 0.35)
+        pattern = smooth_step(band, self.balance, 0.35)
         shades = spectral_noise(rng, self.size, 1.0, 2)
         ground = colorize(to_unit(shades), self.palette[:2])
         ink = paint(self.palette[2]) * (1 + np.float32(0.15) * shades)
-        return finish(mix(ground, ink, figure), rng, self.grain)
+        return finish(mix(ground, ink, pattern), rng, self.grain)
 
 
 @dataclass(frozen=True)

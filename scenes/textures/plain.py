@@ -1,4 +1,4 @@
-"""Pictures with next to no pattern."""
+"""Pictures with almost no pattern."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Skies: equirectangular pictures that surround and light a scene."""
+"""Skies: equirectangular pictures for the environment."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from scenes.spec import Texture
 
 @dataclass(frozen=True)
 class Sky(Texture):
-    """A gradient from zenith to horizon, clouds, the sun's glow, and the land's colour below.
+    """A sky: a gradient from zenith to horizon, clouds, the sun's glow, and the ground's colour below.
 
     Equirectangular: (size / 2, size, 3), the zenith in row 0; periodic along the horizon only.
     """

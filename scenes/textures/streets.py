@@ -1,6 +1,6 @@
-"""Pictures of streets: asphalt, paving, paint, signs, wheels.
+"""Streets at a fixed scale: asphalt, paving, road markings, signs, wheels.
 
-All are drawn by the driving family alone: each belongs on one kind of surface, at one scale.
+Only the driving family uses them: each belongs on one kind of surface, at one scale.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from scenes.appearance.painting import (
 )
 from scenes.random_draws import choose, integer, new_seed, uniform
 from scenes.spec import Texture
-from scenes.textures.cells import nearest_seeds
+from scenes.textures.cells import cellular_noise
 
 
 @dataclass(frozen=True)
 class Asphalt(Texture):
-    """Bitumen with stones in it, darker and lighter patches, cracks, some sealed with tar."""
+    """Bitumen with stones in it, darker and lighter patches, and cracks."""
 
     size: int
     seed: int
-    tone: Srgb
+    color: Srgb
     stones: float
     """Contrast of the grit, standard deviation relative to the tone."""
     patches: float
@@ -53,7 +53,7 @@ class Asphalt(Texture):
         return cls(
             size=size,
             seed=new_seed(rng),
-            tone=shade(uniform(rng, 0.36, 0.58), uniform(rng, 0.0, 0.02), uniform(rng, 20.0, 280.0)),
+            color=shade(uniform(rng, 0.36, 0.58), uniform(rng, 0.0, 0.02), uniform(rng, 20.0, 280.0)),
             stones=uniform(rng, 0.1, 0.22),
             patches=uniform(rng, 0.04, 0.12),
             cracks=uniform(rng, 0.0, 0.6),
@@ -67,18 +67,18 @@ class Asphalt(Texture):
         light = 1 + np.float32(self.stones) * grit + np.float32(self.patches) * slow
         x, y = unit_grid(self.size)
         bend = np.float32(0.06) * spectral_noise(rng, self.size, 1.4, 3)
-        _, first, second = nearest_seeds(rng, x + bend, y - bend, self.cells, 0.9)
+        _, first, second = cellular_noise(rng, x + bend, y - bend, self.cells, 0.9)
         broken = smooth_step(
             slow + np.float32(0.7) * np.roll(slow, self.size // 3, 0), 1.2 - 2 * self.cracks, 0.8
         )
         crack = (1 - smooth_step(second - first, 0.02, 0.02)) * broken * np.float32(self.cracks > 0.1)
-        picture = paint(self.tone) * (np.clip(light, 0.25, 2.0) * (1 - np.float32(0.6) * crack))
+        picture = paint(self.color) * (np.clip(light, 0.25, 2.0) * (1 - np.float32(0.6) * crack))
         return finish(picture, rng, 0.06)
 
 
 @dataclass(frozen=True)
 class Paving(Texture):
-    """Slabs or blocks with joints, each of its own tone: pavements, driveways, garden walls' coping."""
+    """Slabs or blocks of different shades with joints: pavements, driveways, copings."""
 
     size: int
     seed: int
@@ -129,16 +129,16 @@ class Paving(Texture):
 
 
 @dataclass(frozen=True)
-class WornPaint(Texture):
-    """Road paint that has been driven over."""
+class RoadMarkingPaint(Texture):
+    """The worn paint of road markings."""
 
     size: int
     seed: int
     color: Srgb
     below: Srgb
-    """What shows where it has gone."""
+    """What shows where the paint is gone."""
     worn: float
-    """Share gone, about."""
+    """Share that is gone, about."""
 
     popularity: ClassVar[float] = 0.0
 
@@ -162,9 +162,9 @@ class WornPaint(Texture):
 
 @dataclass(frozen=True)
 class RoadSign(Texture):
-    """The face of a sign: a border, a field and a device on it.
+    """The face of a traffic sign: a field with a border and a symbol.
 
-    The picture is the square around the plate, once.
+    The picture is the bounding square of the plate.
     """
 
     size: int

@@ -1,4 +1,4 @@
-"""Pictures that repeat regularly: bricks, checkers, stripes, plaid, dots, weave."""
+"""Regular patterns: bricks, checkers, stripes, plaid, dots, weave."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _wear(rng: np.random.Generator, size: int, strength: float) -> Field:
 
 @dataclass(frozen=True)
 class Bricks(Texture):
-    """Courses of bricks or tiles of varied tone in mortar."""
+    """Courses of bricks or tiles of different shades in mortar."""
 
     size: int
     seed: int
@@ -86,7 +86,7 @@ class Bricks(Texture):
 
 @dataclass(frozen=True)
 class Checkers(Texture):
-    """Squares of two or more colours in turn, worn."""
+    """Squares of two or more colours in turn, a little worn."""
 
     size: int
     seed: int
@@ -165,7 +165,7 @@ class Stripes(Texture):
 
 @dataclass(frozen=True)
 class Plaid(Texture):
-    """Two crossing sets of stripes, woven in twill: tartan, dish cloths."""
+    """Two crossing sets of stripes, woven in twill: tartan, tea towels."""
 
     size: int
     seed: int
@@ -288,8 +288,8 @@ class Weave(Texture):
         across = np.abs(np.where(weft_on_top, fraction(v), fraction(u)) - np.float32(0.5))
         height = np.cos(np.pi * along) * (1 - (2 * across) ** 2 * np.float32(0.6))
         band = 1 - smooth_step(across, 0.5 - self.gap / 2, 0.12)
-        tones = to_unit(spectral_noise(rng, self.size, 0.8, 2))
+        shading = to_unit(spectral_noise(rng, self.size, 0.8, 2))
         color = flat_colors(weft_on_top.astype(np.int32), self.palette)
         shade = np.float32(0.3) + np.float32(0.9) * np.sqrt(np.abs(height)) * band
-        light = shade * (np.float32(0.75) + np.float32(0.5) * tones)
+        light = shade * (np.float32(0.75) + np.float32(0.5) * shading)
         return finish(color * light, rng, self.grain)

@@ -1,1 +1,1 @@
-"""The user's own meshes, textures and environments."""
+"""User assets: meshes, textures and environments from the user's files."""

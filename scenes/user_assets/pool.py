@@ -1,8 +1,8 @@
-"""The user's own meshes, textures and environments: records that name files of a store by their content.
+"""User assets as records: meshes, textures and environments that name the user's files by their content.
 
-A store is a folder of prepared files, `<sha256 of the original>.npz`, made by `datagen.recipe.assets`. Records hold
-the hash only, so they mean the same on any machine; where the stores are is told once a process. Since names
-are contents, it does not matter in which of them a file is found.
+A store is a folder of prepared files, `<sha256 of the original>.npz`, made by `datagen.recipe.assets`. Records
+hold the hash only, so they mean the same on any machine; `use_store` tells a process where the stores are.
+Because names are contents, it does not matter in which store a file is found.
 """
 
 from __future__ import annotations
@@ -17,55 +17,56 @@ from numpy.typing import NDArray
 
 from scenes.geometry.mesh import Mesh
 from scenes.spec import Shape, Texture
+from stereoforge_kit.errors import InputError
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _stores: list[Path] = []
 
 
 def use_store(folder: Path) -> None:
-    """Look for prepared files in `folder` too."""
+    """Add a folder of prepared files to those in which this process looks."""
     if folder not in _stores:
         _stores.append(folder)
 
 
 def _check_sha256(text: str) -> None:
     if not _SHA256.fullmatch(text):
-        raise ValueError(f"a user's file is named by its SHA-256, not {text[:80]!r}")
+        raise InputError(f"a user's file is named by its SHA-256, not {text[:80]!r}")
 
 
 def _load(sha256: str) -> dict[str, NDArray[np.generic]]:
-    """Raises ValueError for what is not in any store."""
+    """The arrays of a prepared file. Raises ValueError for a file that is in no store."""
     _check_sha256(sha256)
     for folder in _stores:
         path = folder / f"{sha256}.npz"
         if path.is_file():
             with np.load(path, allow_pickle=False) as arrays:
                 return dict(arrays)
-    raise ValueError(f"the user's file {sha256[:12]}... is in no store; give the folders it came from again")
+    raise InputError(f"the user's file {sha256[:12]}... is in no store; give the folders it came from again")
 
 
 @dataclass(frozen=True)
 class Asset:
-    """One file of the user's."""
+    """One of the user's files. Raises ValueError for a hash that is none."""
 
     name: str
-    """What it was called, for people."""
+    """Its file name, for messages."""
     sha256: str
-    """Of its bytes."""
+    """SHA-256 of its bytes, 64 hexadecimal digits."""
 
     def __post_init__(self) -> None:
         _check_sha256(self.sha256)
 
     @property
     def split(self) -> str:
-        """The one split that may use it: by its content, eight in ten for train, one for val, one for test."""
+        """The one split that may use it, by its content: 80 % train, 10 % val, 10 % test."""
         share = int(self.sha256[:8], 16) / 2**32
         return "train" if share < 0.8 else "val" if share < 0.9 else "test"
 
 
 @dataclass(frozen=True)
 class AssetPool:
-    """The user's files a sampler may draw from."""
+    """The user's files that a sampler may draw from; false where there are none."""
 
     meshes: tuple[Asset, ...] = ()
     textures: tuple[Asset, ...] = ()
@@ -75,6 +76,7 @@ class AssetPool:
         return bool(self.meshes or self.textures or self.environments)
 
     def of_split(self, split: str) -> AssetPool:
+        """The files that a split may use."""
         return AssetPool(
             *(
                 tuple(asset for asset in kind if asset.split == split)
@@ -85,13 +87,13 @@ class AssetPool:
 
 @dataclass(frozen=True)
 class UserMesh(Shape):
-    """A mesh of the user's, normalised."""
+    """A mesh of the user's, fitted to the unit cube. `mesh` raises ValueError where its file is in no store."""
 
     sha256: str
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:  # noqa: ARG003
-        raise ValueError("the user's meshes are drawn from an AssetPool")
+        raise InputError("the user's meshes are drawn from an AssetPool")
 
     def mesh(self) -> Mesh:
         arrays = _load(self.sha256)
@@ -105,13 +107,13 @@ class UserMesh(Shape):
 
 @dataclass(frozen=True)
 class UserTexture(Texture):
-    """A picture of the user's."""
+    """A picture of the user's. `image` raises ValueError where its file is in no store."""
 
     sha256: str
 
     @classmethod
     def sample(cls, rng: np.random.Generator, size: int) -> Self:  # noqa: ARG003
-        raise ValueError("the user's textures are drawn from an AssetPool")
+        raise InputError("the user's textures are drawn from an AssetPool")
 
     def image(self) -> NDArray[np.uint8]:
         return np.asarray(_load(self.sha256)["image"], np.uint8)
@@ -119,20 +121,20 @@ class UserTexture(Texture):
 
 @dataclass(frozen=True)
 class UserEnvironment(Texture):
-    """An equirectangular picture of the user's that lights the scene with its whole dynamic range."""
+    """An equirectangular picture of the user's, which lights the scene with its whole dynamic range."""
 
     sha256: str
 
     @classmethod
     def sample(cls, rng: np.random.Generator, size: int) -> Self:  # noqa: ARG003
-        raise ValueError("the user's environments are drawn from an AssetPool")
+        raise InputError("the user's environments are drawn from an AssetPool")
 
     def radiance(self) -> NDArray[np.float32]:
         """(H, W, 3) linear RGB of mean luminance 0.5, row 0 at the top."""
         return np.asarray(_load(self.sha256)["radiance"], np.float32)
 
     def image(self) -> NDArray[np.uint8]:
-        """For whoever needs 8 bits."""
+        """The radiance clipped to 0..1, as 8-bit sRGB."""
         return np.rint(np.clip(self.radiance(), 0, 1) ** (1 / 2.2) * 255).astype(np.uint8)
 
 

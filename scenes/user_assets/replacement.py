@@ -1,7 +1,7 @@
-"""The user's own files in a scene that a family has sampled: meshes for props, pictures for surfaces, skies.
+"""User assets in a scene that a family has sampled: meshes for props, pictures for surfaces, environments.
 
-What is drawn here comes after all that the family draws, and only if there are files: scenes without them are
-the same as ever.
+All draws here come after the family's, and there are none without files: so a scene without user assets does
+not change.
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from scenes.spec import Material, Scene, SceneObject, Texture, Trajectory
 from scenes.user_assets.pool import AssetPool, UserEnvironment, UserMesh, UserTexture
 
 USER_SHARE = 0.5
-"""Share of the props, of the paintable materials and of the skies that become the user's own, where given."""
+"""Share of the replaceable props, materials and environments that become user assets, where there are any."""
 
 
 @dataclass(frozen=True)
 class Replaceable:
-    """What of a family's scenes may be the user's own: patterns of objects' whole names."""
+    """What user assets may replace in a family's scenes: regular expressions for the whole names of objects."""
 
     props: str
-    """Things a mesh of the user's may stand in for, each one rigid object."""
+    """Objects that a user's mesh may replace; all of them rigid."""
     painted: str
-    """Things whose materials may wear a picture of the user's."""
+    """Objects whose materials may get a user's picture."""
 
 
-def with_own_content(
+def with_user_assets(
     rng: np.random.Generator, scene: Scene, assets: AssetPool, replaceable: Replaceable
 ) -> Scene:
-    """The scene with about half of what is replaceable made from the user's files."""
+    """The scene with `USER_SHARE` of what is replaceable made from the user's files."""
     objects, materials, world = scene.objects, scene.materials, scene.world
     if assets.meshes:
-        objects = tuple(_own_shape(rng, thing, assets, replaceable) for thing in objects)
+        objects = tuple(_with_user_mesh(rng, thing, assets, replaceable) for thing in objects)
     if assets.textures:
         painted = {t.material for t in scene.objects if re.fullmatch(replaceable.painted, t.name)}
         materials = tuple(
-            _own_picture(rng, material, assets) if index in painted else material
+            _with_user_texture(rng, material, assets) if index in painted else material
             for index, material in enumerate(materials)
         )
     if assets.environments and chance(rng, USER_SHARE):
@@ -49,16 +49,16 @@ def with_own_content(
     return replace(scene, objects=objects, materials=materials, world=world)
 
 
-def _own_picture(rng: np.random.Generator, material: Material, assets: AssetPool) -> Material:
+def _with_user_texture(rng: np.random.Generator, material: Material, assets: AssetPool) -> Material:
     if not chance(rng, USER_SHARE):
         return material
     return replace(material, color=UserTexture(choose(rng, assets.textures).sha256))
 
 
-def _own_shape(
+def _with_user_mesh(
     rng: np.random.Generator, thing: SceneObject, assets: AssetPool, replaceable: Replaceable
 ) -> SceneObject:
-    """A mesh of the user's in a prop's place, on its foot and within its box, so that what was free stays free."""
+    """A user's mesh in a prop's place, on the same foot and within its box, so that nothing new is in the way."""
     if not re.fullmatch(replaceable.props, thing.name) or not chance(rng, USER_SHARE):
         return thing
     shape = UserMesh(choose(rng, assets.meshes).sha256)

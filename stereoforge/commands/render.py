@@ -15,6 +15,7 @@ from datagen.dataset.layout import EXTRA_TARGETS, Layout
 from datagen.dataset.manifest import SceneManifest
 from datagen.executors import Executor
 from datagen.recipe.assets import import_assets
+from datagen.recipe.recipe import fit_disparities
 from datagen.rendering.estimate import estimate_run
 from datagen.rendering.quarantine import QuarantinedScene, quarantined_scenes
 from datagen.rendering.run import SCENE_TIMEOUT_S, local_executor, ray_executor
@@ -108,6 +109,7 @@ class Render:
             )
         recipe = self._recipe()
         executor = self._executor()
+        recipe = fit_disparities(recipe)  # Once, also where assets make the folder first.
         if self.meshes or self.textures or self.environments:
             recipe = self._with_assets(recipe)
         if self.dry_run:

@@ -11,9 +11,9 @@ from typing import Annotated
 import tyro
 
 from datagen.dataset.manifest import SceneManifest
+from datagen.verify.dataset_check import verify_dataset
 from datagen.verify.repair import broken_scenes, problems_left, repair_dataset
 from datagen.verify.report import VerifyReport
-from datagen.verify.run import verify_dataset
 from datagen.verify.scene_check import SAMPLED_PIXELS
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import shown

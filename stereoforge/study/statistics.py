@@ -12,7 +12,7 @@ import cattrs
 import numpy as np
 
 from datagen.dataset.statistics import PIXEL_STEP, textured_share
-from datagen.ground_truth.labels import OCCLUDED, OUT_OF_FRAME
+from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME
 from datagen.sources.stereo_frame import StereoFrame
 from stereoforge_kit.files import write_text
 

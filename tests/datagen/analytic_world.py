@@ -26,7 +26,7 @@ from scenes.textures.plain import SolidColor
 WIDTH, HEIGHT, BASELINE_M = 96, 64, 0.5
 FOCAL_PX = 96.0
 FRAMES = 2
-EYE_OFFSET = {"left": 0.0, "right": BASELINE_M}
+CAMERA_OFFSET = {"left": 0.0, "right": BASELINE_M}
 
 Quaternion = tuple[float, float, float, float]
 
@@ -66,20 +66,20 @@ def _wxyz(rotation: Rotation) -> Quaternion:
 def _rectangle(
     name: str,
     head: Rotation,
-    eye: NDArray[np.float64],
+    view: NDArray[np.float64],
     center: tuple[float, float, float],
     angles: tuple[float, float, float],
     half: tuple[float, float],
 ) -> SceneObject:
     motion = Trajectory.static(
-        tuple(float(v) for v in eye + head.apply(center)), _wxyz(head * Rotation.from_euler("xyz", angles))
+        tuple(float(v) for v in view + head.apply(center)), _wxyz(head * Rotation.from_euler("xyz", angles))
     )
     return SceneObject(name, Plane(), material=0, motion=motion, scale_m=(*half, 1.0))
 
 
 @dataclasses.dataclass(frozen=True)
-class View:
-    """The closed-form arrays of one eye."""
+class RenderedView:
+    """The closed-form arrays of one view."""
 
     image: NDArray[np.uint8]
     disparity: NDArray[np.float32]
@@ -89,9 +89,9 @@ class View:
     object_index: NDArray[np.uint16]
 
 
-def render(scene: Scene, eye: str, instant: int, threshold_px: float = 1.0) -> View:
-    """All arrays of one eye at an instant."""
-    pose = scene.camera.pose(eye, instant)
+def render(scene: Scene, view: str, instant: int, threshold_px: float = 1.0) -> RenderedView:
+    """All arrays of one view at an instant."""
+    pose = scene.camera.pose(view, instant)
     x = np.arange(WIDTH) + 0.5 - WIDTH / 2
     y = np.arange(HEIGHT) + 0.5 - HEIGHT / 2
     rays = np.stack([*np.meshgrid(x / FOCAL_PX, -y / FOCAL_PX), np.full((HEIGHT, WIDTH), -1.0)], axis=-1)
@@ -103,15 +103,15 @@ def render(scene: Scene, eye: str, instant: int, threshold_px: float = 1.0) -> V
     gradient[:-1, :, 1] = np.diff(disparity, axis=0)
     valid = np.abs(gradient).max(axis=-1) <= threshold_px
     valid[:, -1] = valid[-1, :] = False
-    x_other = np.arange(WIDTH) + 0.5 + (-1 if eye == "left" else 1) * disparity.astype(np.float64)
+    x_other = np.arange(WIDTH) + 0.5 + (-1 if view == "left" else 1) * disparity.astype(np.float64)
     outside = (x_other < 0) | (x_other > WIDTH)
-    hidden = _hidden(scene, instant, eye, pose, depth, directions, index)
-    return View(
+    occluded = _occluded(scene, instant, view, pose, depth, directions, index)
+    return RenderedView(
         image=_paint(index, surface, directions),
         disparity=disparity,
         gradient=gradient,
         gradient_valid=valid,
-        occlusion=np.where(outside, 2, np.where(hidden, 1, 0)).astype(np.uint8),
+        occlusion=np.where(outside, 2, np.where(occluded, 1, 0)).astype(np.uint8),
         object_index=index,
     )
 
@@ -142,32 +142,32 @@ def _first_hits(
     return depth, index, surface
 
 
-def _hidden(
+def _occluded(
     scene: Scene,
     instant: int,
-    eye: str,
+    view: str,
     pose: NDArray[np.float64],
     depth: NDArray[np.float64],
     directions: NDArray[np.float64],
     index: NDArray[np.uint16],
 ) -> NDArray[np.bool_]:
-    """Whether another rectangle crosses the way from the surface point (or the sky) to the other eye."""
-    other = scene.camera.pose("right" if eye == "left" else "left", instant)[:3, 3]
+    """Whether another rectangle crosses the way from the surface point (or the sky) to the other view."""
+    other = scene.camera.pose("right" if view == "left" else "left", instant)[:3, 3]
     sky = index == 0
     towards = np.where(
         sky[..., None], directions, pose[:3, 3] + np.where(sky, 0, depth)[..., None] * directions - other
     )
-    hidden = np.zeros(depth.shape, bool)
+    occluded = np.zeros(depth.shape, bool)
     for number, thing in enumerate(scene.objects, start=1):
         length, _ = _meet(thing.pose(instant), other, towards)
-        hidden |= (length < np.where(sky, np.inf, 1.0)) & (index != number)
-    return hidden
+        occluded |= (length < np.where(sky, np.inf, 1.0)) & (index != number)
+    return occluded
 
 
 def _paint(
     index: NDArray[np.uint16], surface: NDArray[np.float64], directions: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
-    """A smooth pattern fixed to each surface, so that both eyes see the same colour at the same point."""
+    """A smooth pattern fixed to each surface, so that both views see the same colour at the same point."""
     angle = np.arctan2(directions[..., 1], directions[..., 0])
     place = np.where((index == 0)[..., None], np.stack([angle, directions[..., 2]], axis=-1), surface)
     u, v = place[..., 0], place[..., 1]
@@ -205,22 +205,24 @@ def write_scene(layout: Layout, split: str, number: int, recipe: Recipe) -> None
     }
     write_camera_data(paths[1], poses)
     for instant in range(FRAMES):
-        for eye in ("left", "right"):
+        for view in ("left", "right"):
             paths += write_view(
-                layout, split, number, eye, FIRST_FRAME + instant, render(scene, eye, instant)
+                layout, split, number, view, FIRST_FRAME + instant, render(scene, view, instant)
             )
     commit(layout, split, number, [file_entry(layout.root, path) for path in paths], recipe)
 
 
-def write_view(layout: Layout, split: str, scene: int, eye: str, frame: int, view: View) -> list[Path]:
-    """Write one eye's files; return their paths."""
+def write_view(
+    layout: Layout, split: str, scene: int, view: str, frame: int, arrays: RenderedView
+) -> list[Path]:
+    """Write one view's files; return their paths."""
     kinds = ("frames_cleanpass", "disparity", "disparity_gradient", "occlusion", "object_index")
-    paths = [layout.file(kind, split, scene, eye, frame) for kind in kinds]
-    write_png(paths[0], view.image)
-    write_pfm(paths[1], view.disparity)
-    write_gradient(paths[2], view.gradient, view.gradient_valid)
-    write_occlusion(paths[3], view.occlusion)
-    write_png(paths[4], view.object_index)
+    paths = [layout.file(kind, split, scene, view, frame) for kind in kinds]
+    write_png(paths[0], arrays.image)
+    write_pfm(paths[1], arrays.disparity)
+    write_gradient(paths[2], arrays.gradient, arrays.gradient_valid)
+    write_occlusion(paths[3], arrays.occlusion)
+    write_png(paths[4], arrays.object_index)
     return paths
 
 

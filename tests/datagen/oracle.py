@@ -53,7 +53,7 @@ def cast_depth(
 def _window(
     t: NDArray[np.float64], width: int, height: int, focal_px: float
 ) -> tuple[tuple[int, int], tuple[int, int]]:
-    """First and last row and column that a triangle can cover: all of them if it crosses the eye's plane."""
+    """First and last row and column that a triangle can cover: all of them if it crosses the view's plane."""
     if t[0, 2] > -NEAR_M or t[1, 2] > -NEAR_M or t[2, 2] > -NEAR_M:
         return (0, height - 1), (0, width - 1)
     low_u, high_u, low_v, high_v = math.inf, -math.inf, math.inf, -math.inf

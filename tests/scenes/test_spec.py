@@ -95,7 +95,7 @@ def test_bad_trajectories_are_refused() -> None:
         Trajectory((0.0, 0.0), ((0.0, 0.0, 0.0),) * 2, ((1.0, 0.0, 0.0, 0.0),) * 2)
 
 
-def test_the_right_eye_is_a_baseline_to_the_right() -> None:
+def test_the_right_view_is_a_baseline_to_the_right() -> None:
     turn = Rotation.from_euler("xyz", (80, 5, 30), degrees=True)
     camera = StereoCamera(960, 540, 35.0, 0.25, Trajectory.static((1.0, 2.0, 3.0), quaternion(turn)))
     left, right = camera.pose("left", 0.0), camera.pose("right", 0.0)

@@ -7,7 +7,8 @@ i depends strongly on j, and j influences i strongly, if w_ij is at least theta 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+
+from stereoforge_kit.kernels import njit, prange
 
 UNDECIDED, FINE, COARSE, DIAGONALLY_DOMINANT = 0, 1, 2, 3
 """States of an unknown. `DIAGONALLY_DOMINANT`: fine and not interpolated, because the smoother alone settles it."""
@@ -15,7 +16,7 @@ _SMALLEST = np.float32(np.finfo(np.float32).smallest_subnormal)
 """A coupling has to be positive to be strong."""
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def sort_by_strength(indptr, indices, data, diagonal, theta, dominance):
     """Sort each row of couplings in place so that the strong ones come first; kernel.
 
@@ -69,13 +70,13 @@ def sort_by_strength(indptr, indices, data, diagonal, theta, dominance):
     return strong_ends, state
 
 
-@njit(cache=True)
+@njit()
 def _swap(indices, data, e, f):
     indices[e], indices[f] = indices[f], indices[e]
     data[e], data[f] = data[f], data[e]
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def cf_splitting(indptr, indices, strong_ends, state, bounds):
     """Decide for each unknown whether it is coarse or fine, by both passes; kernel.
 
@@ -105,7 +106,7 @@ def cf_splitting(indptr, indices, strong_ends, state, bounds):
         _second_pass(indices, strong_ends, state, marker, i, 0, size)
 
 
-@njit(cache=True)
+@njit()
 def _first_pass(indptr, indices, strong_ends, state, measure, following, preceding, first, last):
     """First pass over the unknowns from `first` up to `last` (Ruge and Stueben 1987, Algorithm A2).
 
@@ -141,7 +142,7 @@ def _first_pass(indptr, indices, strong_ends, state, measure, following, precedi
                 _move(bucket, following, preceding, measure, j, -1)
 
 
-@njit(cache=True)
+@njit()
 def _fill_buckets(indptr, indices, strong_ends, state, measure, following, preceding, first, last):
     """Set the initial measures and sort the undecided unknowns into buckets; the first unknown of each bucket, -1 for
     none."""
@@ -157,7 +158,7 @@ def _fill_buckets(indptr, indices, strong_ends, state, measure, following, prece
     return bucket
 
 
-@njit(cache=True)
+@njit()
 def _move(bucket, following, preceding, measure, i, change):
     """Change the measure of an unknown."""
     _remove(bucket, following, preceding, measure[i], i)
@@ -165,7 +166,7 @@ def _move(bucket, following, preceding, measure, i, change):
     _insert(bucket, following, preceding, measure[i], i)
 
 
-@njit(cache=True)
+@njit()
 def _insert(bucket, following, preceding, measure, i):
     following[i], preceding[i] = bucket[measure], -1
     if bucket[measure] >= 0:
@@ -173,7 +174,7 @@ def _insert(bucket, following, preceding, measure, i):
     bucket[measure] = i
 
 
-@njit(cache=True)
+@njit()
 def _remove(bucket, following, preceding, measure, i):
     if preceding[i] >= 0:
         following[preceding[i]] = following[i]
@@ -183,7 +184,7 @@ def _remove(bucket, following, preceding, measure, i):
         preceding[following[i]] = preceding[i]
 
 
-@njit(cache=True)
+@njit()
 def _second_pass(indices, strong_ends, state, marker, i, first, last):
     """Second pass for unknown i, among the unknowns from `first` up to `last` (Ruge and Stueben 1987, Algorithm A3).
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from refine.solvers.amg.csr import CSRMatrix
 from refine.solvers.arrays import Float32Array, IndexArray
+from stereoforge_kit.kernels import njit, prange
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def _transposed(matrix: CSRMatrix, columns: int) -> CSRMatrix:
     return CSRMatrix(indptr, indices, data)
 
 
-@njit(cache=True)
+@njit()
 def _transpose(indptr, indices, data, new_indptr, new_indices, new_data):
     for j in indices:
         new_indptr[j + 1] += 1
@@ -91,7 +91,7 @@ def _unsigned(matrix: CSRMatrix) -> tuple[NDArray[np.uint32], NDArray[np.uint32]
     return matrix.indptr.view(np.uint32), matrix.indices.view(np.uint32), matrix.data
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _first_entries(indptr, indices, data, none, parent, share, p_row_sum):
     """The first entry of each row of P, (none, 0) where there is none, and the row's sum; the length of the longest
     row."""
@@ -108,7 +108,7 @@ def _first_entries(indptr, indices, data, none, parent, share, p_row_sum):
     return longest
 
 
-@njit(cache=True)
+@njit()
 def _accumulate(j, amount, row, marker, sums, columns, used):
     """sums[j] += amount; j is appended to the columns if the row has not met it, without a branch."""
     new = marker[j] != row
@@ -118,7 +118,7 @@ def _accumulate(j, amount, row, marker, sums, columns, used):
     return used + new
 
 
-@njit(cache=True)
+@njit()
 def _multiply_rows(
     indptr, indices, data, diagonal, row_sum, p_row_sum, parent, share, p_indptr, p_indices, p_data, longest,
     r_indptr, r_indices, r_data, first, last, count, coarse_row_sum,
@@ -164,7 +164,7 @@ def _multiply_rows(
     return columns[:used].copy(), values[:used].copy()
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _multiply(
     indptr, indices, data, diagonal, row_sum, p_row_sum, parent, share, p_indptr, p_indices, p_data, longest,
     r_indptr, r_indices, r_data, bounds, count, coarse_row_sum,

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from refine.solvers.amg.cf_splitting import cf_splitting, sort_by_strength
@@ -22,6 +21,7 @@ from refine.solvers.amg.galerkin import RowBlocks, galerkin_product
 from refine.solvers.amg.interpolation import Interpolation, arrange_interpolation, direct_interpolation
 from refine.solvers.amg.sell import sell_smoother
 from refine.solvers.arrays import Float32Array, IndexArray
+from stereoforge_kit.kernels import njit, prange
 
 STRENGTH_THRESHOLD = 0.5
 """theta: i depends strongly on j if their coupling is at least this share of i's largest. At 0.25 the coarse levels
@@ -171,7 +171,7 @@ def _dense_inverse(couplings: CSRMatrix, row_sum: Float32Array) -> Float32Array:
     return np.linalg.pinv((matrix + matrix.T) / 2, hermitian=True).astype(np.float32)
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _diagonal(indptr, data, row_sum):
     diagonal = np.empty(row_sum.size, np.float32)
     for i in prange(row_sum.size):
@@ -182,7 +182,7 @@ def _diagonal(indptr, data, row_sum):
     return diagonal
 
 
-@njit(cache=True)
+@njit()
 def _product(matrix, b):
     """A small dense product: BLAS would wake threads of its own, which then compete with ours."""
     out = np.zeros(matrix.shape[0], matrix.dtype)

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from refine.solvers.amg.cf_splitting import COARSE, FINE
 from refine.solvers.amg.csr import CSRMatrix
 from refine.solvers.amg.sell import SLICE_HEIGHT
 from refine.solvers.arrays import Float32Array, IndexArray
+from stereoforge_kit.kernels import njit, prange
 
 _CHUNKS = 8
 
@@ -121,7 +121,7 @@ def _only_neighbors_overlap(coarse: IndexArray, bounds: NDArray[np.int64]) -> bo
     return bool((highest[:-2] < lowest[2:]).all())
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _count_entries(indices, strong_ends, state, count):
     for i in prange(state.size):
         if state[i] == COARSE:
@@ -131,7 +131,7 @@ def _count_entries(indices, strong_ends, state, count):
                 count[i + 1] += state[indices[e]] == COARSE
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _fill_entries(
     indices, data, diagonal, row_sum, strong_ends, state, number, p_indptr, p_indices, p_weight
 ):
@@ -153,13 +153,13 @@ def _fill_entries(
                 p_weight[e] = p_weight[e] / total * ((diagonal[i] - row_sum[i]) / diagonal[i])
 
 
-@njit(cache=True)
+@njit()
 def _add(target, source, weight, values, out, first, last):
     for e in range(first, last):
         out[target[e]] += weight[e] * values[source[e]]
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _restrict(fine, coarse, weight, bounds, values, out):
     chunks = bounds.size - 1
     for j in prange(out.size):
@@ -171,7 +171,7 @@ def _restrict(fine, coarse, weight, bounds, values, out):
         _add(coarse, fine, weight, values, out, bounds[2 * pair + 1], bounds[2 * pair + 2])
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _prolong(fine, coarse, weight, bounds, values, out):
     for chunk in prange(bounds.size - 1):
         _add(fine, coarse, weight, values, out, bounds[chunk], bounds[chunk + 1])

@@ -15,11 +15,11 @@ the iterations: across an edge they are all that holds one side to the other (do
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
 from refine.solvers.arrays import Float32Array
 from refine.solvers.stencil.padding import MARGIN, row_bands
 from refine.solvers.stencil.weights import BandWeights
+from stereoforge_kit.kernels import njit, prange
 
 COMPENSATION_RATIO = np.float32(3)
 """How many times as strong as a black-black coupling the strongest one beside it must be."""
@@ -49,7 +49,7 @@ def assemble_m_matrix(tau: Float32Array, weights: BandWeights, color_scale: floa
     return couplings
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _assemble(neighbors, color, gradient, scale, first, w):
     """Couplings of a band of rows. Opposite neighbours have the numbers 4 and 3, 6 and 1, 7 and 0, 5 and 2 in
     `refine.energy.affinity.NEIGHBORS`."""
@@ -67,7 +67,7 @@ def _assemble(neighbors, color, gradient, scale, first, w):
             w[3, to, x + 2] = scale * (there * neighbors[5, y, x + 3] + below * neighbors[2, y + 1, x + 2])
 
 
-@njit(cache=True)
+@njit()
 def _compensating_side(w, y, x):
     """Which side of a square with (y, x) at its upper left takes over the coupling of its two black pixels."""
     top, bottom = w[0, y, x], w[0, y + 1, x]
@@ -88,7 +88,7 @@ def _compensating_side(w, y, x):
     return after_left if strongest == left else after_right
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _choose_sides(w, side):
     for row in prange(side.shape[0] - 5):
         y = np.int64(row) + 2  # numba's parallel indices are unsigned
@@ -96,7 +96,7 @@ def _choose_sides(w, side):
             side[y, x] = _compensating_side(w, y, x)
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _compensate(side, w):
     """Add to each coupling what it takes over from the squares on its two sides, then remove it there."""
     for row in prange(side.shape[0] - 4):

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 
 from refine.solvers.amg.csr import CSRMatrix
 from refine.solvers.amg.hierarchy import Hierarchy, build_hierarchy
@@ -20,6 +19,7 @@ from refine.solvers.amg.sell import DAMPING
 from refine.solvers.arrays import Float32Array, IndexArray
 from refine.solvers.bfloat16 import BFloat16Array, round_to_bfloat16, to_float32
 from refine.solvers.stencil.weights import BandWeights
+from stereoforge_kit.kernels import njit, prange
 
 _SMALLEST_DIAGONAL = np.float32(1e-30)
 """A black pixel with a smaller diagonal is not eliminated: its inverse would overflow."""
@@ -117,7 +117,7 @@ def reduced_hierarchy(reduction: RedBlackReduction) -> Hierarchy:
     return build_hierarchy(reduction.schur_complement, smoother)
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _select_eliminated(tau, w, inverse):
     """1 / M_pp at the black pixels that are coupled to no black one: those to be eliminated."""
     height, width = tau.shape[0] - 4, tau.shape[1] - 4
@@ -131,7 +131,7 @@ def _select_eliminated(tau, w, inverse):
                 inverse[y, x] = 1 / diagonal
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _schur_couplings(w, inverse, planes):
     """Couplings of the Schur complement, one square with (y, x) at its upper left at a time."""
     none = np.float32(0)
@@ -153,7 +153,7 @@ def _schur_couplings(w, inverse, planes):
                 planes[2, y, x + 1] += top * here * left + right * beyond * bottom
 
 
-@njit(cache=True)
+@njit()
 def _coupling(planes, y, x, k):
     """Coupling of pixel (y, x) in the direction of offset k of `_REDUCED_STENCIL`."""
     return (
@@ -163,7 +163,7 @@ def _coupling(planes, y, x, k):
     )
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _count_entries(planes, number, indptr):
     for row in prange(number.shape[0] - 4):
         y = np.int64(row) + 2
@@ -175,7 +175,7 @@ def _count_entries(planes, number, indptr):
                 indptr[number[y, x] + 1] = count
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _fill_csr(planes, number, indptr, indices, data):
     for row in prange(number.shape[0] - 4):
         y = np.int64(row) + 2
@@ -190,7 +190,7 @@ def _fill_csr(planes, number, indptr, indices, data):
                         at += 1
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _invert_schur_diagonal(indptr, data, row_sum, place, inverse):
     """-DAMPING / S_pp at the remaining pixels."""
     for i in prange(place.size):
@@ -204,7 +204,7 @@ def _invert_schur_diagonal(indptr, data, row_sum, place, inverse):
 # not vectorised.
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _gather_eliminated(w, inverse, values, y, j):
     """What the eliminated neighbours of a pixel pass on to it: sum_q w_pq values_q / M_qq."""
     none = np.float32(0)
@@ -215,7 +215,7 @@ def _gather_eliminated(w, inverse, values, y, j):
     return across + down
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _schur_row_sums(tau, w, inverse, number, row_sum):
     for y in prange(number.shape[0] - 4):
         for x in range(number.shape[1] - 4):
@@ -223,7 +223,7 @@ def _schur_row_sums(tau, w, inverse, number, row_sum):
                 row_sum[number[y + 2, x + 2]] = tau[y + 2, x + 2] + _gather_eliminated(w, inverse, tau, y, x)
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
+@njit(parallel=True, fastmath={"contract"})
 def _restrict(w, inverse, residual, out):
     height, width = residual.shape[0] - 4, residual.shape[1] - 4
     for y in prange(height):
@@ -231,7 +231,7 @@ def _restrict(w, inverse, residual, out):
             out[y + 2, j + 2] = residual[y + 2, j + 2] + _gather_eliminated(w, inverse, residual, y, j)
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _axial_sum(w, x, y, j):
     """sum_q w_pq x_q over the four axial neighbours."""
     total = (
@@ -241,7 +241,7 @@ def _axial_sum(w, x, y, j):
     return total + to_float32(w[1, y + 1, j + 2]) * x[y + 1, j + 2]
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
+@njit(parallel=True, fastmath={"contract"})
 def _prolong(w, inverse, solution, residual, x):
     height, width = residual.shape[0] - 4, residual.shape[1] - 4
     for y in prange(height):
@@ -251,7 +251,7 @@ def _prolong(w, inverse, solution, residual, x):
             x[y + 2, j + 2] += eliminated if own > 0 else solution[y + 2, j + 2]
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
+@njit(parallel=True, fastmath={"contract"})
 def _fill_eliminated(w, inverse, x):
     """Set eliminated pixels to the solution for a residual of 0. Their axial neighbours all remain, so none reads what
     is written here."""
@@ -264,7 +264,7 @@ def _fill_eliminated(w, inverse, x):
         x[y + 2, 2:-2] = row
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _residual(tau, w, b, x, y, j):
     """(b - M x)_p, from differences."""
     c = x[y + 2, j + 2]
@@ -279,7 +279,7 @@ def _residual(tau, w, b, x, y, j):
     return total + to_float32(w[3, y + 1, j + 2]) * (x[y + 1, j + 3] - c)
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
+@njit(parallel=True, fastmath={"contract"})
 def _pre_smooth(tau, w, inverse, b, x, residual):
     height, width = tau.shape[0] - 4, tau.shape[1] - 4
     for y in prange(height):
@@ -291,7 +291,7 @@ def _pre_smooth(tau, w, inverse, b, x, residual):
             residual[y + 2, j + 2] = _residual(tau, w, b, x, y, j)
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
+@njit(parallel=True, fastmath={"contract"})
 def _post_smooth(tau, w, inverse, b, x, out):
     height, width = tau.shape[0] - 4, tau.shape[1] - 4
     _fill_eliminated(w, inverse, x)

@@ -19,12 +19,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from refine.solvers.amg.csr import CSRMatrix
 from refine.solvers.arrays import Float32Array, IndexArray
 from refine.solvers.bfloat16 import BFloat16Array, to_bfloat16, to_float32
+from stereoforge_kit.kernels import njit, prange
 
 SLICE_HEIGHT = 512
 """C and sigma: unknowns that are stored together, and sorted among themselves."""
@@ -113,7 +113,7 @@ def sell_smoother(couplings: CSRMatrix, row_sum: Float32Array) -> tuple[SELLSmoo
     return SELLSmoother(slice_ptr, diagonal_ptr, column, values, bias, damped_inverse), position
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _sort_by_length(indptr, indices, position, longest):
     """Place the unknowns of each slice by their number of couplings, by counting sort; the bandwidth of the matrix."""
     bandwidth = 0
@@ -138,7 +138,7 @@ def _sort_by_length(indptr, indices, position, longest):
     return bandwidth
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _fill_slices(
     indptr, indices, data, row_sum, position, slice_ptr, diagonal_ptr, column, values, bias, damped_inverse
 ):
@@ -164,7 +164,7 @@ def _fill_slices(
     diagonal_ptr[diagonal_ptr.size - 1] = column.size
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _add_couplings(slice_ptr, diagonal_ptr, column, values, offset, s, x, out):
     """out_i += sum_j w_ij x_j for the unknowns of slice s."""
     for k in range(slice_ptr[s], slice_ptr[s + 1]):
@@ -174,7 +174,7 @@ def _add_couplings(slice_ptr, diagonal_ptr, column, values, offset, s, x, out):
             out[i] += to_float32(couplings[i]) * x[np.uint64(columns[i] + offset)]
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
+@njit(parallel=True, fastmath={"contract"})
 def _pre_smooth(slice_ptr, diagonal_ptr, column, values, bias, damped_inverse, b, x, residual):
     """With x = omega D^-1 b, b - M x = (1 - omega) b + W x."""
     for i in prange(b.size):
@@ -186,7 +186,7 @@ def _pre_smooth(slice_ptr, diagonal_ptr, column, values, bias, damped_inverse, b
         _add_couplings(slice_ptr, diagonal_ptr, column, values, low - bias, s, x, residual[low:high])
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
+@njit(parallel=True, fastmath={"contract"})
 def _post_smooth(slice_ptr, diagonal_ptr, column, values, bias, damped_inverse, b, x, out):
     """x + omega D^-1 (b - M x) = (1 - omega) x + omega D^-1 (b + W x)."""
     for s in prange(slice_ptr.size - 1):

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 
 from refine.energy.affinity import NEIGHBORS
 from refine.energy.system import Form
@@ -22,6 +21,7 @@ from refine.solvers.bfloat16 import BFloat16Array, to_float32
 from refine.solvers.linear import SolverError
 from refine.solvers.stencil.padding import MARGIN, crop, row_bands
 from refine.solvers.stencil.weights import BandWeights
+from stereoforge_kit.kernels import njit, prange
 
 HALF_STENCIL = ((0, 1), (0, 2), *((dy, dx) for dy in (1, 2) for dx in range(-2, 3)))
 """One of each pair of opposite offsets (rows down, columns right) in the 5x5 window: the planes of the symmetric
@@ -106,7 +106,7 @@ def assemble_operator(tau: Float32Array, weights: BandWeights, form: Form) -> St
     return StencilOperator(tau, planes)
 
 
-@njit(cache=True, parallel=True, fastmath=True)
+@njit(parallel=True, fastmath=True)
 def _assemble_exact(weights, color, gradient, first, planes):
     """Off-diagonal planes of N + beta L' Phibar L for a band of rows: a sum over the windows, with centres s, that hold
     both p and p + o."""
@@ -138,7 +138,7 @@ def _assemble_exact(weights, color, gradient, first, planes):
             planes[4, first + y + 2, x + 2] -= gradient[1, y + 2, x + 2]
 
 
-@njit(cache=True)
+@njit()
 def _neighbor_number(dy, dx):
     """Number of the offset among `NEIGHBORS`; -1 for the centre."""
     number = (dy + 1) * 3 + dx + 1
@@ -147,7 +147,7 @@ def _neighbor_number(dy, dx):
     return number if number < 4 else number - 1
 
 
-@njit(cache=True, parallel=True, fastmath=True)
+@njit(parallel=True, fastmath=True)
 def _assemble_paper(weights, color, gradient, first, planes):
     """Off-diagonal planes of N + beta Phibar L for a band of rows."""
     height, width = color.shape[0] - 4, color.shape[1] - 4
@@ -161,7 +161,7 @@ def _assemble_paper(weights, color, gradient, first, planes):
             planes[6, first + y + 2, x + 2] -= gradient[1, y + 2, x + 2]
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _apply_row(a, tau, x, y, out):
     """Row y of A x into a padded row.
 
@@ -182,7 +182,7 @@ def _apply_row(a, tau, x, y, out):
             _add_plane(a[k, y + 2], 0, x[y + 2 + dy], dx, here, out)
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _add_plane(plane, shift, row, dx, here, out):
     """Add A_pq (x_q - x_p) for the neighbours q at column offset dx in `row`; A_pq is at column offset `shift` in
     `plane`."""
@@ -190,13 +190,13 @@ def _add_plane(plane, shift, row, dx, here, out):
         out[j] += plane[j + shift] * (row[j + dx] - here[j])
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _apply(a, tau, x, out):
     for y in prange(tau.shape[0] - 4):
         _apply_row(a, tau, x, y, out[y + 2])
 
 
-@njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
+@njit(parallel=True, fastmath={"contract", "reassoc"})
 def _apply_and_dot(a, tau, x, other, out):
     dot = norm = 0.0
     for y in prange(tau.shape[0] - 4):
@@ -211,7 +211,7 @@ def _apply_and_dot(a, tau, x, other, out):
     return dot, norm
 
 
-@njit(cache=True, parallel=True, fastmath={"contract", "reassoc"})
+@njit(parallel=True, fastmath={"contract", "reassoc"})
 def _residual(a, tau, b, x, out):
     norm = 0.0
     for y in prange(tau.shape[0] - 4):
@@ -226,7 +226,7 @@ def _residual(a, tau, b, x, out):
     return norm
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
+@njit(parallel=True, fastmath={"contract"})
 def _jacobi_step(a, tau, b, damped_inverse, x, out):
     for y in prange(tau.shape[0] - 4):
         row = out[y + 2]
@@ -236,7 +236,7 @@ def _jacobi_step(a, tau, b, damped_inverse, x, out):
             row[j] = x_row[j] + to_float32(factor[j]) * (b_row[j] - row[j])
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _invert_symmetric_diagonal(a, tau, inverse):
     height, width = tau.shape[0] - 4, tau.shape[1] - 4
     for y in prange(height):
@@ -249,7 +249,7 @@ def _invert_symmetric_diagonal(a, tau, inverse):
             inverse[y + 2, j + 2] = 1 / diagonal if diagonal > 0 else 0
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _invert_diagonal(a, tau, inverse):
     height, width = tau.shape[0] - 4, tau.shape[1] - 4
     for y in prange(height):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 
 from refine.energy.affinity import Floats
 from refine.solvers.arrays import Float32Array
@@ -13,6 +12,7 @@ from refine.solvers.linear import Problem
 from refine.solvers.stencil.operator import StencilOperator, assemble_operator
 from refine.solvers.stencil.padding import pad
 from refine.solvers.stencil.weights import StencilWeights, stencil_weights
+from stereoforge_kit.kernels import njit, prange
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def assemble_system(problem: Problem, tau: Float32Array) -> StencilSystem:
     return StencilSystem(operator, b, norm)
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _assemble_right_hand_side(disparity, gradient, tau, gradient_weight, first, right_hand_side):
     """Rows of b = T D + alpha C' Phi G from `first` on."""
     width = disparity.shape[1]

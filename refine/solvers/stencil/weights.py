@@ -11,12 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 
 from refine.energy.affinity import NEIGHBORS
 from refine.solvers.arrays import Float32Array
 from refine.solvers.linear import Problem
 from refine.solvers.stencil.padding import MARGIN, pad
+from stereoforge_kit.kernels import njit, prange
 
 _NEIGHBORS = np.array(NEIGHBORS)
 
@@ -112,7 +112,7 @@ def _weight_tables(problem: Problem) -> tuple[Float32Array, Float32Array]:
     return (alpha * phi).astype(np.float32), (beta * (1 - phi)).astype(np.float32)
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _exp(t):
     """exp of a float32 that is not positive, in operations that vectorise; 0 below -87."""
     exponent = np.floor(t * np.float32(1.44269504) + np.float32(0.5))
@@ -124,7 +124,7 @@ def _exp(t):
     return series * np.int32(power << np.int32(23)).view(np.float32) if t > np.float32(-87) else np.float32(0)
 
 
-@njit(cache=True, parallel=True, fastmath={"contract"})
+@njit(parallel=True, fastmath={"contract"})
 def _compute_weights(
     image, gradient, first, gradient_table, color_table, neighbor_weight, gradient_weight, color_weight
 ):
@@ -147,7 +147,7 @@ def _compute_weights(
             _neighbor_weights(grey, row, y, height, neighbor_weight)
 
 
-@njit(cache=True)
+@njit()
 def _edge_weights(image, gradient, y, gradient_table, color_table, gradient_weight, color_weight):
     """Image row y of alpha phi_x, alpha phi_y and beta (2 - phi_x - phi_y)."""
     height, width = image.shape[:2]
@@ -168,7 +168,7 @@ def _edge_weights(image, gradient, y, gradient_table, color_table, gradient_weig
             gradient_weight[1, x + 2] = gradient_table[squared_y]
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _neighbor_weights(grey, row, y, height, weights):
     """Row `row` of w_pq, which is image row y."""
     width = grey.shape[1]
@@ -189,7 +189,7 @@ def _neighbor_weights(grey, row, y, height, weights):
             out[x + 2] = plane[x] * normaliser[x]
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(fastmath={"contract"})
 def _window_statistics(grey, row, y, height, squared, falloff):
     """(g_q - g_p)^2 for the eight neighbours q, and -1 / c_p, in units of summed channels."""
     width = grey.shape[1]

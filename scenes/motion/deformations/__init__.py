@@ -1,4 +1,4 @@
-"""Non-rigid motions. A new `Deformation` subclass in a module here is found by itself."""
+"""Non-rigid motions. A new `Deformation` subclass in a module here needs no registration."""
 
 import sys
 

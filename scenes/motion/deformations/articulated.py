@@ -1,4 +1,4 @@
-"""Bodies with limbs: a tree of joints that swing, and a skin that follows them."""
+"""Articulated bodies: a tree of joints that swing, and a skin that follows them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from scenes.spec import Deformation, Vector
 
 @dataclass(frozen=True)
 class Joint:
-    """One bone of a body at rest, in the body's own coordinates, and how it swings about its start."""
+    """One bone of a body at rest, in body coordinates, and how it swings about its start."""
 
     parent: int
-    """Index of the joint it hangs on, smaller than its own; -1 for the root."""
+    """Index of its parent, smaller than its own; -1 for the root."""
     start: Vector
     end: Vector
     radius: float
-    """Thickness of the flesh about it, which decides what skin it carries."""
+    """Thickness of the flesh about it, which decides how much of the skin follows it."""
     axis: Vector = (0.0, 1.0, 0.0)
     """Unit vector about which it swings."""
     amplitude_deg: float = 0.0
@@ -36,21 +36,21 @@ class Joint:
 class Articulated(Deformation):
     """Linear blend skinning (Magnenat-Thalmann et al. 1988) of a body whose joints swing periodically.
 
-    Each point of the skin follows the joints by how near they are at rest. Of the feet, the lowest is
-    always at the height it has at rest: the body rises and sinks over its legs.
+    Each point of the skin follows the joints by how near they are at rest. The body rises and sinks over its
+    legs, so that the lowest foot is always at the height it has at rest.
     """
 
     joints: tuple[Joint, ...]
     period_frames: float
     centre: Vector = (0.0, 0.0, 0.0)
-    """Mesh coordinates times `unit` plus this are the body's coordinates."""
+    """Body coordinates are mesh coordinates times `unit`, plus this."""
     unit: float = 1.0
     feet: tuple[int, ...] = ()
     """Joints whose ends stand on the ground; none for what hangs, swims or flies."""
     softness: float = 0.03
-    """Width of the zone over which the skin passes from one joint to the next, in the body's coordinates."""
+    """Width of the zone in which the skin passes from one joint to the next, in body coordinates."""
     carried_by: int = -1
-    """The one joint the whole mesh follows rigidly (eyes, horns, tools); -1 for a skin."""
+    """Index of the one joint that the whole mesh follows rigidly (eyes, horns, tools); -1 for a skin."""
 
     def deformed(self, vertices: NDArray[np.float64], time_frames: float) -> NDArray[np.float64]:
         rest = vertices * self.unit + self.centre
@@ -65,7 +65,7 @@ class Articulated(Deformation):
         return placed
 
     def poses(self, time_frames: float) -> NDArray[np.float64]:
-        """(J, 4, 4) motion of every joint from rest, in the body's coordinates."""
+        """(J, 4, 4) motion of every joint from rest, in body coordinates."""
         moves = np.empty((len(self.joints), 4, 4))
         for index, joint in enumerate(self.joints):
             cycle = joint.cycles * time_frames / self.period_frames + joint.phase
@@ -79,7 +79,7 @@ class Articulated(Deformation):
         return moves
 
     def _lift(self, moves: NDArray[np.float64]) -> float:
-        """How high the lowest foot is above its rest, smoothly where two feet change places."""
+        """How high the lowest foot is above its rest: a smooth minimum, because two feet take turns."""
         ends = np.array([self.joints[foot].end for foot in self.feet])
         now = np.einsum("fij,fj->fi", moves[list(self.feet), :3, :3], ends) + moves[list(self.feet), :3, 3]
         rise = now[:, 2] - ends[:, 2]
@@ -88,7 +88,7 @@ class Articulated(Deformation):
         return float(lowest - np.log(np.exp((lowest - rise) * sharpness).mean()) / sharpness)
 
     def _weights(self, rest: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(V, J) shares of the joints in each vertex's motion, rows of sum 1."""
+        """(V, J) skinning weights of the joints for each vertex; every row sums to 1."""
         start = np.array([joint.start for joint in self.joints])
         end = np.array([joint.end for joint in self.joints])
         radius = np.array([joint.radius for joint in self.joints])

@@ -1,4 +1,4 @@
-"""Things rooted at their base that sway: grass, saplings, hair."""
+"""Swaying of what is rooted at one end: grass, saplings, vines."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Sway(Deformation):
     phase: float = 0.0
     """Where in its period the motion is at frame 0, 0..1."""
     root: float = -1.0
-    """z of the root, in mesh coordinates; what is on its other side stands still."""
+    """z of the root, in mesh coordinates. What is beyond the root stands still."""
     tip: float = 1.0
-    """z of the tip; below the root for what hangs."""
+    """z of the tip, in mesh coordinates; below the root for what hangs."""
 
     def deformed(self, vertices: NDArray[np.float64], time_frames: float) -> NDArray[np.float64]:
         heading = math.radians(self.direction_deg)

@@ -1,4 +1,4 @@
-"""The lie of the land: eroded terrain, caves, boulders, dripstone."""
+"""Landforms: eroded terrain, caves, boulders, dripstone."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import Triangles, Vertices, grid_triangles, icosphere, joined, revolve, solid
+from scenes.geometry.building import Part, block_under, grid_triangles, icosphere, joined, revolve, solid
 from scenes.geometry.mesh import Mesh
 from scenes.random_draws import chance, integer, log_uniform, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import PartedShape
 from scenes.shapes.solids.basic import sample_proportions
 from scenes.shapes.solids.organic import wave_noise
 from scenes.spec import Shape, Vector
@@ -47,9 +47,9 @@ def eroded_relief(
 
 @dataclass(frozen=True)
 class Landscape(Shape):
-    """A block of land: a gentle clearing in the middle, eroded hills or mountains about it.
+    """A block of land: a level clearing in the middle, eroded hills or mountains about it.
 
-    The cells are smaller towards the middle, where a camera stands; the middle itself is at height 0.
+    The cells are smaller towards the middle, where a camera stands; the land has height 0 there.
     """
 
     relief: float
@@ -120,27 +120,9 @@ class Landscape(Shape):
         return solid(*block_under(np.stack([x, y, height], -1), self._floor(height)), smooth=True)
 
 
-def block_under(top: NDArray[np.float64], floor: float) -> tuple[Vertices, Triangles]:
-    """The closed block between a (R, C, 3) surface and a flat floor."""
-    rows, columns = top.shape[:2]
-    index = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
-    ring = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
-    points = top.reshape(-1, 3)
-    skirt = np.column_stack([points[ring, :2], np.full(len(ring), floor)])
-    below = len(points) + np.arange(len(ring))
-    along, along_below = np.roll(ring, -1), np.roll(below, -1)
-    hub = np.full(len(ring), len(points) + len(ring))
-    walls = [np.stack([ring, below, along_below], -1), np.stack([ring, along_below, along], -1)]
-    triangles = np.concatenate(
-        [grid_triangles(rows, columns), *walls, np.stack([hub, along_below, below], -1)]
-    )
-    middle = (*points[:, :2].mean(axis=0), floor)
-    return np.concatenate([points, skirt, [middle]]), triangles
-
-
 @dataclass(frozen=True)
-class Cavern(Standing):
-    """A winding tunnel through rock, open at both ends: its wall is solid, a traveller inside is not.
+class Cavern(PartedShape):
+    """A winding tunnel through rock, open at both ends. Its wall is the solid; a camera inside is outside of it.
 
     It runs along +y from y = 0; the axis is at the origin there. Its radius is about 1.
     """
@@ -232,7 +214,7 @@ class Boulder(Shape):
 
 
 @dataclass(frozen=True)
-class Dripstone(Standing):
+class Dripstone(PartedShape):
     """A cluster of lumpy cones: stalagmites; turned over, stalactites."""
 
     cones: int

@@ -1,4 +1,4 @@
-"""Buildings and what is left of them: columns, arches, block walls and towers, steps, houses, roofs."""
+"""Buildings and ruins: columns, arches, walls and towers of blocks, steps, houses."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from manifold3d import Manifold, OpType
 from numpy.typing import NDArray
 
-from scenes.geometry.building import cross_section, grid_triangles, joined, manifold_arrays
+from scenes.geometry.building import Part, cross_section, grid_triangles, joined, manifold_arrays
 from scenes.random_draws import chance, integer, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import PartedShape
 from scenes.shapes.solids.organic import wave_noise
 
 _BOX = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
@@ -34,7 +34,7 @@ _BOX_FACES = np.array(
 )
 
 
-def boxes(
+def oriented_boxes(
     centre: NDArray[np.float64], half: NDArray[np.float64], turn: NDArray[np.float64] | None = None
 ) -> Part:
     """Boxes about (N, 3) centres with (N, 3) half sides, each turned by a (N, 3, 3) rotation."""
@@ -46,7 +46,7 @@ def boxes(
 
 
 @dataclass(frozen=True)
-class Column(Standing):
+class Column(PartedShape):
     """A fluted or plain shaft on a base, with a capital, or broken off."""
 
     slenderness: float
@@ -97,7 +97,7 @@ class Column(Standing):
     @staticmethod
     def _slab(half: float, low: float, high: float) -> Part:
         middle, size = np.array([[0.0, 0.0, (low + high) / 2]]), np.array([[half, half, (high - low) / 2]])
-        return boxes(middle, size)
+        return oriented_boxes(middle, size)
 
     @staticmethod
     def _drum(radius: NDArray[np.float64], height: NDArray[np.float64]) -> Part:
@@ -132,7 +132,7 @@ class Column(Standing):
 
 
 @dataclass(frozen=True)
-class Archway(Standing):
+class Archway(PartedShape):
     """A wall with round-arched openings side by side: gates, arcades, aqueducts, bridges."""
 
     openings: int
@@ -197,8 +197,8 @@ class Archway(Standing):
 
 
 @dataclass(frozen=True)
-class BlockWall(Standing):
-    """Courses of single stones, along a line or an arc, the top courses partly fallen: walls, towers."""
+class BlockWall(PartedShape):
+    """Courses of single stones along a line or an arc, the top courses partly fallen: walls, towers."""
 
     courses: int
     stones: int
@@ -266,11 +266,11 @@ class BlockWall(Standing):
         turn[:, 0, 0] = turn[:, 1, 1] = np.cos(heading)
         turn[:, 0, 1], turn[:, 1, 0] = -np.sin(heading), np.sin(heading)
         turn[:, 2, 2] = 1.0
-        return {"stone": boxes(centre, half, turn)}
+        return {"stone": oriented_boxes(centre, half, turn)}
 
 
 @dataclass(frozen=True)
-class Steps(Standing):
+class Steps(PartedShape):
     """A flight of worn steps up to a landing."""
 
     steps: int
@@ -311,11 +311,11 @@ class Steps(Standing):
         centre = np.stack(
             [np.zeros(self.steps), (start + end) / 2 - end / 2, (np.arange(self.steps) + 0.5) * self.rise], -1
         )
-        return {"stone": boxes(centre, half)}
+        return {"stone": oriented_boxes(centre, half)}
 
 
 @dataclass(frozen=True)
-class House(Standing):
+class House(PartedShape):
     """Walls with windows and a door cut into them, and a gabled roof that overhangs them."""
 
     length: float
@@ -361,7 +361,7 @@ class House(Standing):
         if self.chimney:
             top = self.height + self.pitch / 2
             middle = np.array([[0.22, 0.25 * self.length, (self.height + top + 0.15) / 2]])
-            stack = boxes(middle, np.array([[0.07, 0.07, (top + 0.15 - self.height) / 2]]))
+            stack = oriented_boxes(middle, np.array([[0.07, 0.07, (top + 0.15 - self.height) / 2]]))
             parts["walls"] = joined(parts["walls"], stack)
         return parts
 

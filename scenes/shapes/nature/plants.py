@@ -10,16 +10,16 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from scenes.geometry.building import joined, revolve, struts
-from scenes.geometry.leaves import arched, around, horizontal_side, strips
-from scenes.geometry.stems import UP, leaf_cloud, stem, unit, winding_path
+from scenes.geometry.building import Part, joined, revolve, struts
+from scenes.geometry.leaves import arched, around, strips, width_directions
+from scenes.geometry.stems import UP, leaf_cloud, normalized, stem, winding_path
 from scenes.random_draws import choose, integer, log_uniform, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import PartedShape
 from scenes.spec import Shape
 
 
 @dataclass(frozen=True)
-class GrassTuft(Standing):
+class GrassTuft(PartedShape):
     """Blades growing from a disc, bending outward: grass, reeds, a mop of hair."""
 
     blades: int
@@ -52,7 +52,7 @@ class GrassTuft(Standing):
         share, heading = np.sqrt(rng.random(n)), rng.uniform(0.0, 2 * np.pi, n)
         outward = np.stack([np.cos(heading), np.sin(heading), np.zeros(n)], -1)
         lean = np.radians(self.lean_deg) * share * rng.uniform(0.5, 1.3, n)
-        aside = unit(outward + rng.normal(0.0, 0.4, (n, 3)) * (1, 1, 0))
+        aside = normalized(outward + rng.normal(0.0, 0.4, (n, 3)) * (1, 1, 0))
         direction = np.cos(lean)[:, None] * UP + np.sin(lean)[:, None] * aside
         length = rng.uniform(0.45, 1.0, n)
         base = outward * (self.spread * share)[:, None]
@@ -63,16 +63,16 @@ class GrassTuft(Standing):
         paths += (bend[:, None] * rise)[..., None] * (0.8 * aside - 0.55 * UP)[:, None]
         paths[..., 2] = np.maximum(paths[..., 2], 0.0)
         width = self.width * rng.uniform(0.7, 1.3, (n, 1)) * np.array([[1.0, 0.75]])
-        return {"blades": strips(paths, horizontal_side(direction, rng), width, 0.25)}
+        return {"blades": strips(paths, width_directions(direction, rng), width, 0.25)}
 
 
 @dataclass(frozen=True)
-class Fern(Standing):
-    """Arching fronds with a row of leaflets on either side."""
+class Fern(PartedShape):
+    """Arching fronds, each with two rows of leaflets."""
 
     fronds: int
     leaflets: int
-    """On each side of a frond."""
+    """In each row of a frond."""
     elevation_deg: float
     """How steeply the fronds rise at their base."""
     droop: float
@@ -99,7 +99,7 @@ class Fern(Standing):
         droop = self.droop * rng.uniform(0.7, 1.3, self.fronds)
         length = rng.uniform(0.7, 1.0, self.fronds)
         spine = arched(np.zeros((self.fronds, 3)), direction, length, droop, 7)
-        side = horizontal_side(direction, rng)
+        side = width_directions(direction, rng)
         stalk = strips(spine, side, np.full((self.fronds, 5), 0.012), 0.8)
         # Leaflets start a fifth of the way up the frond; longest at a third, none at the tip.
         at = np.linspace(0.2, 0.97, self.leaflets)
@@ -107,10 +107,10 @@ class Fern(Standing):
         step = at * 6
         low = np.minimum(step.astype(int), 5)
         points = spine[:, low] + (spine[:, low + 1] - spine[:, low]) * (step - low)[:, None]
-        ahead = unit(spine[:, low + 1] - spine[:, low])
+        ahead = normalized(spine[:, low + 1] - spine[:, low])
         parts = [stalk]
         for sign in (-1.0, 1.0):
-            outward = unit(sign * side[:, None] + 0.45 * ahead + rng.normal(0.0, 0.06, points.shape))
+            outward = normalized(sign * side[:, None] + 0.45 * ahead + rng.normal(0.0, 0.06, points.shape))
             base, aim = points.reshape(-1, 3), outward.reshape(-1, 3)
             lengths = (length[:, None] * size).ravel()
             paths = arched(base, aim, lengths, np.full(len(base), 0.25), 3)
@@ -119,7 +119,7 @@ class Fern(Standing):
 
 
 @dataclass(frozen=True)
-class BroadLeaves(Standing):
+class BroadLeaves(PartedShape):
     """A rosette of large leaves on arching stalks: banana, hosta, rubber plant, agave."""
 
     leaves: int
@@ -163,12 +163,12 @@ class BroadLeaves(Standing):
         blade = np.clip((share - self.stalk) / (1 - self.stalk), 0.0, 1.0)
         outline = np.maximum(self.width * np.sin(np.pi * blade**0.75) ** 0.7, 0.018 * (1.2 - share))
         widths = length[:, None] * outline[None] * rng.uniform(0.8, 1.2, (self.leaves, 1))
-        side = unit(horizontal_side(direction, rng) + rng.normal(0.0, 0.2, (self.leaves, 3)))
+        side = normalized(width_directions(direction, rng) + rng.normal(0.0, 0.2, (self.leaves, 3)))
         return {"leaves": strips(paths, side, widths, 0.14)}
 
 
 @dataclass(frozen=True)
-class Bush(Standing):
+class Bush(PartedShape):
     """A heap of leafy balls with twigs inside."""
 
     clumps: int
@@ -203,7 +203,7 @@ class Bush(Standing):
 
 
 @dataclass(frozen=True)
-class Vine(Standing):
+class Vine(PartedShape):
     """A hanging, winding cord with leaves along it: liana, ivy."""
 
     wobble: float
@@ -232,15 +232,15 @@ class Vine(Standing):
         path = winding_path(rng, np.zeros(3), np.array((0.0, 0.0, -1.0)), self.wobble, 24)
         cord = stem(path, self.thickness * np.linspace(1.0, 0.5, 24), 6)
         at = rng.integers(1, 24, self.leaves)
-        direction = unit(rng.normal(size=(self.leaves, 3)) * (1, 1, 0.3) - 0.5 * UP)
+        direction = normalized(rng.normal(size=(self.leaves, 3)) * (1, 1, 0.3) - 0.5 * UP)
         length = self.leaf_size * rng.uniform(0.6, 1.3, self.leaves)
         paths = arched(path[at], direction, length, rng.uniform(0.1, 0.5, self.leaves), 4)
         widths = (0.36 * length)[:, None] * np.array([[1.0, 0.7]])
-        return {"cord": cord, "leaves": strips(paths, horizontal_side(direction, rng), widths, 0.15)}
+        return {"cord": cord, "leaves": strips(paths, width_directions(direction, rng), widths, 0.15)}
 
 
 @dataclass(frozen=True)
-class Mushroom(Standing):
+class Mushroom(PartedShape):
     """A bent stem under a cap: toadstool, bolete, bracket."""
 
     cap_radius: float
@@ -309,7 +309,7 @@ class Mushroom(Standing):
             ],
             -1,
         )
-        outward = unit(spot - (0.0, 0.0, level - 0.3 * self.cap_radius))
+        outward = normalized(spot - (0.0, 0.0, level - 0.3 * self.cap_radius))
         size = self.cap_radius * rng.uniform(0.05, 0.12, self.lumps)
         return [
             struts(
@@ -322,9 +322,10 @@ class Mushroom(Standing):
         ]
 
 
-LEAFY: tuple[type[Shape], ...] = (Fern, BroadLeaves, Bush)
-"""Undergrowth that any green place may have."""
+UNDERGROWTH: tuple[type[Shape], ...] = (Fern, BroadLeaves, Bush)
+"""Kinds of undergrowth."""
 
 
 def sample_undergrowth(rng: np.random.Generator) -> Shape:
-    return choose(rng, LEAFY, [0.35, 0.35, 0.3]).sample(rng)
+    """A random fern, broad-leaved plant or bush."""
+    return choose(rng, UNDERGROWTH, [0.35, 0.35, 0.3]).sample(rng)

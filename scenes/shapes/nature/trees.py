@@ -7,15 +7,15 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from scenes.geometry.building import Vertices, joined
-from scenes.geometry.leaves import arched, around, horizontal_side, strips
-from scenes.geometry.stems import UP, leaf_cloud, stem, unit, winding_path
+from scenes.geometry.building import Part, Vertices, joined
+from scenes.geometry.leaves import arched, around, strips, width_directions
+from scenes.geometry.stems import UP, leaf_cloud, normalized, stem, winding_path
 from scenes.random_draws import integer, new_seed, uniform
-from scenes.shapes.anchored import Part, Standing
+from scenes.shapes.anchored import PartedShape
 
 
 @dataclass(frozen=True)
-class Tree(Standing):
+class Tree(PartedShape):
     """A winding trunk with spreading roots, boughs, and leaves about the ends of the boughs."""
 
     height: float
@@ -91,7 +91,7 @@ class Tree(Standing):
 
 
 @dataclass(frozen=True)
-class Palm(Standing):
+class Palm(PartedShape):
     """A ringed, leaning trunk with a head of fronds."""
 
     height: float
@@ -127,16 +127,18 @@ class Palm(Standing):
         base = np.tile(path[-1], (self.fronds, 1))
         length = rng.uniform(0.8, 1.1, self.fronds)
         spine = arched(base, direction, length, self.droop * rng.uniform(0.6, 1.2, self.fronds), 9)
-        side = horizontal_side(direction, rng)
+        side = width_directions(direction, rng)
         fronds = [strips(spine, side, np.full((self.fronds, 7), 0.018), 0.8)]
-        ahead = unit(np.gradient(spine, axis=1))
+        ahead = normalized(np.gradient(spine, axis=1))
         fine = np.linspace(1.2, 7.8, 26)
         low = fine.astype(int)
         points = spine[:, low] + (spine[:, low + 1] - spine[:, low]) * (fine - low)[:, None]
         along = ahead[:, low]
         size = 0.3 * np.sin(np.pi * (fine / 8.4) ** 0.8) + 0.04
         for sign in (-1.0, 1.0):
-            aim = unit(sign * side[:, None] + 0.5 * along - 0.35 * UP + rng.normal(0, 0.08, points.shape))
+            aim = normalized(
+                sign * side[:, None] + 0.5 * along - 0.35 * UP + rng.normal(0, 0.08, points.shape)
+            )
             lengths = (length[:, None] * size).ravel()
             paths = arched(points.reshape(-1, 3), aim.reshape(-1, 3), lengths, np.full(lengths.shape, 0.3), 3)
             fronds.append(strips(paths, along.reshape(-1, 3), np.full((len(paths), 1), 0.022), 0.2))
@@ -144,7 +146,7 @@ class Palm(Standing):
 
 
 @dataclass(frozen=True)
-class Conifer(Standing):
+class Conifer(PartedShape):
     """A straight trunk with whorls of drooping, needled branches: spruce, fir."""
 
     whorls: int
@@ -186,20 +188,20 @@ class Conifer(Standing):
         bases, directions, lengths = np.concatenate(base), np.concatenate(direction), np.concatenate(length)
         droop = self.droop * rng.uniform(0.7, 1.3, len(bases))
         spine = arched(bases, directions, lengths, droop, 5)
-        side = horizontal_side(directions, rng)
+        side = width_directions(directions, rng)
         needles = [strips(spine, side, lengths[:, None] * np.array([[0.10, 0.12, 0.07]]), 0.3)]
         # Twigs along both sides of every branch, hanging a little.
         for at in (1, 2, 3):
             for sign in (-1.0, 1.0):
-                aim = unit(sign * side + 0.9 * directions - 0.35 * UP + rng.normal(0, 0.1, side.shape))
+                aim = normalized(sign * side + 0.9 * directions - 0.35 * UP + rng.normal(0, 0.1, side.shape))
                 twig = lengths * (0.42, 0.34, 0.24)[at - 1]
                 paths = arched(spine[:, at], aim, twig, np.full(len(twig), 0.3), 3)
-                needles.append(strips(paths, unit(np.cross(aim, UP)), (0.16 * twig)[:, None], 0.3))
+                needles.append(strips(paths, normalized(np.cross(aim, UP)), (0.16 * twig)[:, None], 0.3))
         return {"wood": trunk, "leaves": joined(*needles)}
 
 
 @dataclass(frozen=True)
-class Bamboo(Standing):
+class Bamboo(PartedShape):
     """A clump of jointed culms with sprays of narrow leaves."""
 
     culms: int
@@ -244,10 +246,10 @@ class Bamboo(Standing):
     def _sprays(self, rng: np.random.Generator, path: Vertices) -> Part:
         """Five narrow leaves at random nodes of the upper two thirds."""
         at = rng.integers(len(path) // 3, len(path), self.leaves).repeat(5)
-        aside = unit(rng.normal(size=(self.leaves, 3)) * (1, 1, 0.2)).repeat(5, axis=0)
-        direction = unit(aside + rng.normal(0.0, 0.45, aside.shape))
+        aside = normalized(rng.normal(size=(self.leaves, 3)) * (1, 1, 0.2)).repeat(5, axis=0)
+        direction = normalized(aside + rng.normal(0.0, 0.45, aside.shape))
         length = rng.uniform(0.07, 0.13, len(at))
         base = path[at] + aside * rng.uniform(0.01, 0.06, (len(at), 1))
         paths = arched(base, direction, length, rng.uniform(0.3, 0.8, len(at)), 4)
         widths = (0.1 * length)[:, None] * np.array([[1.0, 0.8]])
-        return strips(paths, horizontal_side(direction, rng), widths, 0.2)
+        return strips(paths, width_directions(direction, rng), widths, 0.2)

@@ -1,4 +1,4 @@
-"""The plain solids: planes, boxes, ellipsoids, superquadrics."""
+"""Basic solids: planes, boxes, ellipsoids, superquadrics."""
 
 from __future__ import annotations
 

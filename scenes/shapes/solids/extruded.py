@@ -1,4 +1,4 @@
-"""Plane outlines pulled into the third dimension: stars, gears, holed plates."""
+"""Extruded outlines: stars, gears, plates with holes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from scenes.spec import Shape
 
 @dataclass(frozen=True)
 class ExtrudedStar(Shape):
-    """A star or regular polygon, optionally with a hole, pulled up, twisted and tapered."""
+    """An extruded star or regular polygon, optionally with a hole, twisted and tapered."""
 
     points: int
     inner_radius: float
@@ -71,7 +71,7 @@ class ExtrudedStar(Shape):
 
 @dataclass(frozen=True)
 class Gear(Shape):
-    """A toothed wheel with a bore and, when `spokes` is not 0, as many windows."""
+    """A toothed wheel with a bore and, if `spokes` is not 0, as many openings between spokes."""
 
     teeth: int
     tooth_depth: float

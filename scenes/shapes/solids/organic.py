@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from scenes.geometry.building import Triangles, Vertices, grid_triangles, icosphere, joined, solid, struts
+from scenes.geometry.building import Triangles, Vertices, block_under, icosphere, joined, solid, struts
 from scenes.geometry.mesh import Mesh
 from scenes.random_draws import integer, log_uniform, new_seed, uniform
 from scenes.shapes.solids.basic import sample_proportions
@@ -20,7 +20,7 @@ from scenes.spec import Shape, Vector
 def wave_noise(
     rng: np.random.Generator, points: NDArray[np.float64], frequency: float, slope: float, waves: int = 24
 ) -> NDArray[np.float64]:
-    """Smooth noise of unit variance at points (N, D): plane waves of random direction, length and phase.
+    """(N,) smooth noise of unit variance at points (N, D): a sum of plane waves of random direction and phase.
 
     Wave numbers run log-uniformly from `frequency` to 4 * `frequency` (radians per unit), amplitudes fall
     as number^-slope.
@@ -196,8 +196,8 @@ def _leaves(
 class Terrain(Shape):
     """A block with a hilly top: the ground of a scene, or a piece of landscape.
 
-    The cells are smaller towards the middle, where a camera stands. The middle itself is at height 0 of the
-    hills, so that an observer's height over the ground is known.
+    The cells are smaller towards the middle, where a camera stands. The hills have height 0 in the middle, so
+    that a camera's height over the ground is known.
     """
 
     relief: float
@@ -246,24 +246,6 @@ class Terrain(Shape):
 
     def mesh(self) -> Mesh:
         plan = self._plan()
-        top = np.column_stack([plan, self.height(plan)])
-        floor = float(top[:, 2].min()) - self.depth
-        n = self.cells + 1
-        ring = np.concatenate(
-            [
-                np.arange(n),
-                np.arange(1, n) * n + n - 1,
-                n * n - 2 - np.arange(n - 1),
-                np.arange(n - 2, 0, -1) * n,
-            ]
-        )
-        skirt = np.column_stack([plan[ring], np.full(len(ring), floor)])
-        below = n * n + np.arange(len(ring))
-        along, along_below = np.roll(ring, -1), np.roll(below, -1)
-        walls = np.concatenate(
-            [np.stack([ring, below, along_below], -1), np.stack([ring, along_below, along], -1)]
-        )
-        hub = np.full(len(ring), n * n + len(ring))
-        bottom = np.stack([hub, along_below, below], -1)
-        vertices = np.concatenate([top, skirt, [(0.0, 0.0, floor)]])
-        return solid(vertices, np.concatenate([grid_triangles(n, n), walls, bottom]), smooth=True)
+        height = self.height(plan)
+        top = np.column_stack([plan, height]).reshape(self.cells + 1, self.cells + 1, 3)
+        return solid(*block_under(top, float(height.min()) - self.depth, (0.0, 0.0)), smooth=True)

@@ -1,4 +1,4 @@
-"""Surfaces of revolution and what bending, twisting and tapering make of them."""
+"""Surfaces of revolution, some of them bent, twisted and tapered."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import Vertices, grid_triangles, solid
+from scenes.geometry.building import Vertices, slab_triangles, solid
 from scenes.geometry.mesh import Mesh
 from scenes.random_draws import integer, log_uniform, new_seed, uniform
 from scenes.shapes.solids.organic import wave_noise
@@ -18,9 +18,9 @@ from scenes.spec import Shape
 def thickened(
     points: NDArray[np.float64], plan: NDArray[np.float64], thickness: float, *, smooth: bool
 ) -> Mesh:
-    """A sheet of points (R, C, 3) given a thickness along its normals; `plan` (R, C, 2) is its texture.
+    """A closed slab: a sheet of points (R, C, 3) with a thickness along its normals.
 
-    Closed: the two faces share a rim of quadrilaterals.
+    `plan` (R, C, 2) are the texture coordinates of the points.
     """
     rows, columns = points.shape[:2]
     along_rows, along_columns = np.gradient(points, axis=0), np.gradient(points, axis=1)
@@ -28,28 +28,12 @@ def thickened(
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     top = (points + normal * thickness / 2).reshape(-1, 3)
     bottom = (points - normal * thickness / 2).reshape(-1, 3)
-    face = grid_triangles(rows, columns)
-    count = rows * columns
-    rim = _rim(rows, columns)
-    following = np.roll(rim, -1)
-    walls = np.concatenate(
-        [
-            np.stack([rim, rim + count, following + count], -1),
-            np.stack([rim, following + count, following], -1),
-        ]
-    )
     vertices: Vertices = np.concatenate([top, bottom])
-    triangles = np.concatenate([face, face[:, ::-1] + count, walls])
+    triangles = slab_triangles(rows, columns)
     uv = np.tile(plan.reshape(-1, 2), (2, 1))
     # The underside's vertices lie a little aside in the texture, so that the rim shows some of it.
-    uv[count:] += thickness
+    uv[rows * columns :] += thickness
     return solid(vertices, triangles, uv=uv[triangles], smooth=smooth)
-
-
-def _rim(rows: int, columns: int) -> NDArray[np.int64]:
-    """Indices of a grid's border, once around in the sense of its triangles."""
-    index = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
-    return np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Thin things: poles, springs, knots, wire frames, trusses. What stereo networks find hardest."""
+"""Thin structures, which are hardest for stereo matching: poles, springs, knots, wire frames, lattices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What divides gardens from pavements: fences, walls and hedges that follow a street's course."""
+"""Boundaries of gardens: fences, walls and hedges that follow a street's course."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.geometry.building import Triangles, Vertices, joined, struts
+from scenes.geometry.polyhedra import boxes
 from scenes.random_draws import choose, new_seed, uniform
-from scenes.shapes.metric import MetricShape, Surface, boxes
+from scenes.shapes.anchored import MetricShape, Surface
 from scenes.shapes.street.road import Course, sample_course
 from scenes.shapes.street.roadside_plants import sprays
 

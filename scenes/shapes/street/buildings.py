@@ -1,4 +1,4 @@
-"""Houses, part by part: walls with window openings, what stands in the openings, trim, roof.
+"""Houses, part by part: walls with window openings, the windows in them, trim, roof.
 
 A building's parts share one design and one origin: the left end of its front at the ground, seen from the
 street. x runs along the front, y into the building, z up, metres.
@@ -12,17 +12,17 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import Triangles, Vertices, box_uv, joined
+from scenes.geometry.building import Part, Triangles, Vertices, box_uv, joined
+from scenes.geometry.polyhedra import boxes, hexahedra, turned
 from scenes.random_draws import chance, choose, integer, uniform
-from scenes.shapes.metric import MetricShape, Surface, boxes, hexahedra, turned
+from scenes.shapes.anchored import MetricShape, Surface
 
-_Part = tuple[Vertices, Triangles]
 _Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 WALL_M = 0.36
 """Thickness of the walls."""
 NOMINAL_BAY_M = 3.0
-"""One bay or floor of a wall in the texture coordinates of what stands in its openings."""
+"""Length of one bay or floor of a wall in the texture coordinates of its windows."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,7 @@ class HouseDesign:
 
     @property
     def width(self) -> float:
+        """Length of the front, metres."""
         return self.bays * self.bay
 
     @property
@@ -170,7 +171,7 @@ def _wall(design: HouseDesign, front: bool) -> list[_Box]:
     return items
 
 
-def _box_part(items: list[_Box]) -> _Part:
+def _box_part(items: list[_Box]) -> Part:
     return boxes(np.array([low for low, _ in items]), np.array([high for _, high in items]))
 
 
@@ -180,7 +181,7 @@ def _side_design(design: HouseDesign) -> HouseDesign:
     return replace(design, bays=bays, bay=design.depth / bays)
 
 
-def _on_all_sides(design: HouseDesign, front: list[_Box], side: list[_Box]) -> list[_Part]:
+def _on_all_sides(design: HouseDesign, front: list[_Box], side: list[_Box]) -> list[Part]:
     """The front's boxes and, turned about the corners, those of both sides."""
     parts = [_box_part(front)]
     if side:
@@ -222,7 +223,7 @@ class HouseWalls(MetricShape):
             parts.append(self._gables())
         return Surface(*joined(*parts))
 
-    def _gables(self) -> _Part:
+    def _gables(self) -> Part:
         design = self.design
         high = design.eaves + float(np.tan(np.radians(design.roof_pitch_deg))) * (design.depth / 2 - 0.1)
         profile = [(0.1, design.eaves - 0.1), (design.depth - 0.1, design.eaves - 0.1)]
@@ -235,7 +236,7 @@ class HouseWalls(MetricShape):
 
 @dataclass(frozen=True)
 class HouseWindows(MetricShape):
-    """The body behind the openings of the ground floor or of all others.
+    """The windows of the ground floor or of all others: one body behind the openings of the walls.
 
     Texture coordinates count bays and floors, each as `NOMINAL_BAY_M`, so that a picture of windows meets the
     openings.

@@ -8,10 +8,11 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import joined, revolve
+from scenes.geometry.building import Part, joined, revolve
+from scenes.geometry.polyhedra import boxes, hexahedra, loft
 from scenes.random_draws import choose, uniform
-from scenes.shapes.metric import MetricShape, Surface, boxes, hexahedra, loft
-from scenes.shapes.street.wheels import MIRROR_M, Part, without_arches
+from scenes.shapes.anchored import MetricShape, Surface
+from scenes.shapes.street.wheels import MIRROR_M, without_arches
 from scenes.spec import Vector
 
 
@@ -79,6 +80,7 @@ class CarDesign:
 
     @property
     def axles(self) -> tuple[float, ...]:
+        """x of the front and of the rear axle, metres."""
         return (self.wheelbase / 2, -self.wheelbase / 2)
 
     @property
@@ -113,7 +115,8 @@ class CarDesign:
         return self.clearance + 0.1 * np.clip((share - 0.72) / 0.28, 0.0, 1.0) ** 2
 
 
-def any_car(rng: np.random.Generator) -> CarDesign:
+def sample_car_design(rng: np.random.Generator) -> CarDesign:
+    """A random passenger car of any kind."""
     return CarDesign.sample(rng, choose(rng, ["hatchback", "saloon", "estate", "suv"]))
 
 
@@ -136,7 +139,7 @@ class CarBody(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_car(rng))
+        return cls(sample_car_design(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -232,7 +235,7 @@ class CarGlass(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_car(rng))
+        return cls(sample_car_design(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -262,7 +265,7 @@ class CarTrim(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_car(rng))
+        return cls(sample_car_design(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -297,7 +300,7 @@ class CarLamps(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_car(rng), bool(rng.random() < 0.5))
+        return cls(sample_car_design(rng), bool(rng.random() < 0.5))
 
     def surface(self) -> Surface:
         design = self.design

@@ -1,6 +1,6 @@
-"""What stands along a street: lamp posts, signs, traffic lights, fences, bollards, bins, benches, shelters.
+"""Street furniture: lamp posts, signs, traffic lights, bollards, bins, benches, cabinets, shelters.
 
-Each stands on its origin; x is along the street or away from the post, z up, metres.
+The anchor is on the ground; x is along the street or away from the post, z up, metres.
 """
 
 from __future__ import annotations
@@ -11,14 +11,13 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import Triangles, Vertices, joined, regular_polygon, revolve, struts, tube
+from scenes.geometry.building import Part, joined, regular_polygon, revolve, struts, tube
+from scenes.geometry.polyhedra import boxes, loft
 from scenes.random_draws import chance, choose, integer, uniform
-from scenes.shapes.metric import MetricShape, Surface, boxes, loft
-
-_Part = tuple[Vertices, Triangles]
+from scenes.shapes.anchored import MetricShape, Surface
 
 
-def _post(height: float, foot: float, top: float, sides: int = 12) -> _Part:
+def _post(height: float, foot: float, top: float, sides: int = 12) -> Part:
     """A tapering round post, a little below the ground at its foot."""
     start, end = np.array([(0.0, 0.0, -0.2)]), np.array([(0.0, 0.0, height)])
     return struts(start, end, np.array([foot]), np.array([top]), sides)
@@ -126,7 +125,7 @@ class SignPost(MetricShape):
         return Surface(*joined(post, plate))
 
 
-def _plate(corners: int, half: float, near: float, far: float, z: float) -> _Part:
+def _plate(corners: int, half: float, near: float, far: float, z: float) -> Part:
     """An upright plate facing along x, between two distances from the post."""
     outline = _plate_outline(corners) * half
     rings = [
@@ -379,24 +378,3 @@ class BusShelter(MetricShape):
             low.append((-half + 0.01, 0.01, z))
             high.append((half - 0.01, 0.05, z + 0.05))
         return Surface(*boxes(np.array(low), np.array(high)))
-
-
-@dataclass(frozen=True)
-class OverheadWire(MetricShape):
-    """A wire that sags between two points of the x axis at a height."""
-
-    length: float
-    sag: float
-    height: float
-
-    @classmethod
-    def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(uniform(rng, 15.0, 35.0), uniform(rng, 0.3, 1.0), uniform(rng, 5.5, 7.5))
-
-    def surface(self) -> Surface:
-        share = np.linspace(0.0, 1.0, 15)
-        path = np.stack(
-            [share * self.length, np.zeros(15), self.height - self.sag * 4 * share * (1 - share)], -1
-        )
-        vertices, triangles, _ = tube(path, np.full(15, 0.016), 5)
-        return Surface(vertices, triangles)

@@ -12,11 +12,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import Triangles, Vertices, joined, revolve, tube
+from scenes.geometry.building import Part, joined, revolve, tube
+from scenes.geometry.polyhedra import boxes, loft
 from scenes.random_draws import chance, uniform
-from scenes.shapes.metric import MetricShape, Surface, boxes, loft
-
-_Part = tuple[Vertices, Triangles]
+from scenes.shapes.anchored import MetricShape, Surface
 
 
 @dataclass(frozen=True)
@@ -55,9 +54,11 @@ class PersonDesign:
 
     @property
     def scale(self) -> float:
+        """Size relative to a person of 1.75 m."""
         return self.height / 1.75
 
     def hip(self, side: float) -> NDArray[np.float64]:
+        """(3,) the left (1) or right (-1) hip joint of the unscaled body, metres."""
         return np.array((0.0, 0.095 * side * self.girth, 0.9))
 
     def leg(self, side: float) -> NDArray[np.float64]:
@@ -83,13 +84,13 @@ class PersonDesign:
         wrist = elbow + 0.25 * np.array((np.sin(swing + 0.35), 0.3 * out, -np.cos(swing + 0.35)))
         return np.stack([shoulder, elbow, wrist])
 
-    def placed(self, *parts: _Part) -> Surface:
+    def placed(self, *parts: Part) -> Surface:
         """Parts of the unscaled standing body, lowered onto the ground and scaled."""
         vertices, triangles = joined(*parts)
         return Surface((vertices - (0.0, 0.0, self.drop)) * self.scale, triangles)
 
 
-def _limb(joints: NDArray[np.float64], radii: tuple[float, float, float]) -> _Part:
+def _limb(joints: NDArray[np.float64], radii: tuple[float, float, float]) -> Part:
     """A round limb through three joints, its ends drawn in."""
     ends = joints[[0, -1]] + 0.6 * np.array([[radii[0]], [radii[-1]]]) * _directions(joints)
     middle = [(joints[k] + joints[k + 1]) / 2 for k in (0, 1)]
@@ -106,7 +107,7 @@ def _directions(joints: NDArray[np.float64]) -> NDArray[np.float64]:
     return ends / np.linalg.norm(ends, axis=1, keepdims=True)
 
 
-def _stack(levels: list[tuple[float, float, float, float]], girth: float) -> _Part:
+def _stack(levels: list[tuple[float, float, float, float]], girth: float) -> Part:
     """An upright body of elliptic sections: height, half width, half depth, and middle x of each."""
     angle = np.linspace(0, 2 * np.pi, 14, endpoint=False)
     rings = [
@@ -116,7 +117,7 @@ def _stack(levels: list[tuple[float, float, float, float]], girth: float) -> _Pa
     return loft(np.stack(rings))
 
 
-def _ball(middle: tuple[float, float, float], size: tuple[float, float, float]) -> _Part:
+def _ball(middle: tuple[float, float, float], size: tuple[float, float, float]) -> Part:
     latitude = np.linspace(-np.pi / 2, np.pi / 2, 8)
     vertices, triangles = revolve(np.cos(latitude), np.sin(latitude), 11)
     return vertices * size + middle, triangles

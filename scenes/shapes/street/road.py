@@ -1,4 +1,4 @@
-"""Streets: surfaces swept along a winding course, and the paint on them."""
+"""Roads: surfaces swept along a winding course, and the markings on them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
-from scenes.geometry.building import Triangles, Vertices, grid_triangles, joined
+from scenes.geometry.building import Triangles, Vertices, joined, slab_triangles
+from scenes.geometry.polyhedra import boxes, loft, outward
 from scenes.random_draws import chance, integer, uniform
-from scenes.shapes.metric import MetricShape, Surface, boxes, loft, outward
+from scenes.shapes.anchored import MetricShape, Surface
 from scenes.spec import Vector
 
 _STEP_M = 0.5
@@ -24,8 +25,8 @@ _STEP_M = 0.5
 class Course:
     """A street's centre line: headings at equal steps, smooth between, never turning back on itself.
 
-    Coordinates along it are (s, t): metres along the line, metres to its left. s = 0 is the world's origin,
-    where the heading is that of the x axis.
+    Street coordinates are (s, t), as in OpenDRIVE: metres along the line, metres to its left. s = 0 is the
+    world's origin, where the heading is that of the x axis.
     """
 
     start_m: float
@@ -45,6 +46,7 @@ class Course:
 
     @property
     def end_m(self) -> float:
+        """s of the last heading."""
         return self.start_m + self.spacing_m * (len(self.headings_deg) - 1)
 
     @cached_property
@@ -80,6 +82,7 @@ class Course:
         )
 
     def place(self, s_m: float, t_m: float, z_m: float = 0.0) -> Vector:
+        """The world point at street coordinates (s, t) and a height."""
         x, y = self.point(s_m, t_m)
         return (float(x), float(y), z_m)
 
@@ -98,7 +101,7 @@ class Course:
 
 
 def sample_course(rng: np.random.Generator) -> Course:
-    """Any course, for shapes that are drawn on their own."""
+    """A random course, for shapes that are sampled on their own."""
     return Course.sample(rng, -20.0, uniform(rng, 60.0, 180.0), 25.0)
 
 
@@ -159,8 +162,8 @@ class Stripe:
 
 
 @dataclass(frozen=True)
-class RoadPaint(MetricShape):
-    """Lane lines, zebra bars, arrows, patches of tar: bars a few millimetres thick that follow a course."""
+class RoadMarkings(MetricShape):
+    """Lane lines, zebra bars, patches of tar: bars a few millimetres thick that follow a course."""
 
     course: Course
     stripes: tuple[Stripe, ...]
@@ -197,25 +200,13 @@ class RoadPaint(MetricShape):
         s = s + stripe.shear * np.linspace(0.0, 1.0, columns)
         plan = self.course.point(s, t).reshape(-1, 2)
         height = self._height(t).ravel()
-        count = rows * columns
-        face = grid_triangles(rows, columns)
-        index = np.arange(count).reshape(rows, columns)
-        rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
-        following = np.roll(rim, -1)
-        walls = np.concatenate(
-            [
-                np.stack([rim, rim + count, following + count], -1),
-                np.stack([rim, following + count, following], -1),
-            ]
-        )
         vertices = np.concatenate(
             [
                 np.column_stack([plan, height + self.thickness_m]),
                 np.column_stack([plan, height - 0.02]),
             ]
         )
-        triangles = np.concatenate([face, face[:, ::-1] + count, walls])
-        return vertices, outward(vertices, triangles)
+        return vertices, outward(vertices, slab_triangles(rows, columns))
 
 
 @dataclass(frozen=True)
@@ -262,7 +253,7 @@ class Kerb(MetricShape):
 
 
 @dataclass(frozen=True)
-class Field(MetricShape):
+class LevelGround(MetricShape):
     """Level land along the x axis, a slab a metre thick."""
 
     from_m: float

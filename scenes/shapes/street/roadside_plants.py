@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from scenes.geometry.building import Triangles, Vertices, icosphere, joined, struts
+from scenes.geometry.building import Part, Vertices, icosphere, joined, struts
 from scenes.random_draws import chance, choose, integer, new_seed, uniform
-from scenes.shapes.metric import MetricShape, Surface
+from scenes.shapes.anchored import MetricShape, Surface
 from scenes.shapes.solids.organic import wave_noise
-
-_Part = tuple[Vertices, Triangles]
 
 _LEAF = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.12), (0.45, 0.42, 0.0), (0.45, -0.42, 0.0)])
 _LEAF_TRIANGLES = np.array([(0, 2, 3), (1, 3, 2), (0, 1, 2), (0, 3, 1)], np.int64)
@@ -99,7 +97,7 @@ class TreeStem(MetricShape):
             parts += self._twigs(rng, fork, middles)
         return Surface(*joined(*parts))
 
-    def _twigs(self, rng: np.random.Generator, fork: Vertices, tips: Vertices) -> list[_Part]:
+    def _twigs(self, rng: np.random.Generator, fork: Vertices, tips: Vertices) -> list[Part]:
         """Two generations of ever thinner twigs along the boughs."""
         parts = []
         start, end, radius, length = fork, tips, 0.2 * self.design.stem_radius, 0.3 * self.design.crown_width
@@ -116,7 +114,7 @@ class TreeStem(MetricShape):
         return parts
 
 
-def sprays(rng: np.random.Generator, places: Vertices, outward: Vertices, size: float) -> _Part:
+def sprays(rng: np.random.Generator, places: Vertices, outward: Vertices, size: float) -> Part:
     """Flat pointed sprays at places (N, 3), leaning outward and in all directions."""
     count = len(places)
     aim = outward + rng.normal(0, 0.7, (count, 3))
@@ -129,7 +127,7 @@ def sprays(rng: np.random.Generator, places: Vertices, outward: Vertices, size: 
     return vertices.reshape(-1, 3), triangles.reshape(-1, 3)
 
 
-def _clump(rng: np.random.Generator, middle: NDArray[np.float64], radius: float) -> _Part:
+def _clump(rng: np.random.Generator, middle: NDArray[np.float64], radius: float) -> Part:
     """A lumpy ball."""
     ball, triangles = icosphere(1)
     lumps = 1 + 0.16 * wave_noise(rng, ball, 2.5, 1.0)

@@ -8,10 +8,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.geometry.building import joined
+from scenes.geometry.building import Part, joined
+from scenes.geometry.polyhedra import boxes, hexahedra, loft
 from scenes.random_draws import choose, uniform
-from scenes.shapes.metric import MetricShape, Surface, boxes, hexahedra, loft
-from scenes.shapes.street.wheels import MIRROR_M, Part, without_arches
+from scenes.shapes.anchored import MetricShape, Surface
+from scenes.shapes.street.wheels import MIRROR_M, without_arches
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,7 @@ class VanDesign:
 
     @property
     def track(self) -> float:
+        """Distance from the middle to the middle of a wheel, metres."""
         return self.width / 2 - 0.15
 
     @property
@@ -97,12 +99,13 @@ class VanDesign:
         return (self.length / 2 - self.nose, {"van": 1.12, "lorry": 1.45, "bus": 1.05}[self.kind])
 
 
-def any_van(rng: np.random.Generator) -> VanDesign:
+def sample_van_design(rng: np.random.Generator) -> VanDesign:
+    """A random van, lorry or bus."""
     return VanDesign.sample(rng, choose(rng, ["van", "lorry", "bus"]))
 
 
-def _pulled(profile: NDArray[np.float64], half_width: float, bevel: float) -> Part:
-    """A side view pulled across the vehicle's width, its edges bevelled."""
+def _extruded(profile: NDArray[np.float64], half_width: float, bevel: float) -> Part:
+    """A side view extruded across the vehicle's width, its edges bevelled."""
     middle = profile.mean(axis=0)
     size = np.ptp(profile, axis=0)
     inset = middle + (profile - middle) * (1 - 2 * bevel / size)
@@ -126,11 +129,11 @@ class VanBody(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_van(rng))
+        return cls(sample_van_design(rng))
 
     def surface(self) -> Surface:
         design = self.design
-        body = _pulled(design.profile(), design.width / 2, 0.07)
+        body = _extruded(design.profile(), design.width / 2, 0.07)
         body = without_arches(body, design.axles, design.wheel_radius, design.width)
         x, half, z = design.screen_foot[0] - 0.1, design.width / 2, design.screen_foot[1] + 0.25
         low = np.array([(x - 0.05, half - 0.13, z), (x - 0.05, -half - MIRROR_M, z)])
@@ -170,7 +173,7 @@ class VanGlass(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_van(rng))
+        return cls(sample_van_design(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -224,7 +227,7 @@ class VanTrim(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_van(rng))
+        return cls(sample_van_design(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -255,7 +258,7 @@ class VanLamps(MetricShape):
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(any_van(rng), bool(rng.random() < 0.5))
+        return cls(sample_van_design(rng), bool(rng.random() < 0.5))
 
     def surface(self) -> Surface:
         design = self.design

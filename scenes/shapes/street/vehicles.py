@@ -15,4 +15,4 @@ VEHICLE_PARTS = (
     *(VanBody, CargoBox, VanGlass, VanTrim, VanLamps),
     *(Wheel, WheelSet),
 )
-"""What makes an object a part of a vehicle."""
+"""Kinds of shapes that are parts of vehicles."""

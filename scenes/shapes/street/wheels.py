@@ -8,11 +8,10 @@ from typing import ClassVar, Self
 import numpy as np
 from manifold3d import Manifold, Mesh64
 
-from scenes.geometry.building import Triangles, Vertices, joined, manifold_arrays, revolve
+from scenes.geometry.building import Part, joined, manifold_arrays, revolve
+from scenes.geometry.polyhedra import outward
 from scenes.random_draws import integer, uniform
-from scenes.shapes.metric import MetricShape, Surface, outward
-
-Part = tuple[Vertices, Triangles]
+from scenes.shapes.anchored import MetricShape, Surface
 
 MIRROR_M = 0.12
 """How far door mirrors stand out of the body."""
@@ -74,7 +73,7 @@ class Wheel(MetricShape):
 
 @dataclass(frozen=True)
 class WheelSet(MetricShape):
-    """All wheels of a vehicle that stands still, in its own frame."""
+    """All wheels of a vehicle that stands still, in the coordinates of the vehicle."""
 
     wheel: Wheel
     places: tuple[tuple[float, float], ...]

@@ -106,9 +106,9 @@ def driving(root: Path) -> World:
 
 def monkaa(root: Path) -> World:
     w = world()
-    for eye, image, truth in (("left", w.left, w.disparity_left), ("right", w.right, w.disparity_right)):
-        png(root / "frames_cleanpass/eating_x2" / eye / "0000.png", image)
-        pfm(root / "disparity/eating_x2" / eye / "0000.pfm", truth)
+    for view, image, truth in (("left", w.left, w.disparity_left), ("right", w.right, w.disparity_right)):
+        png(root / "frames_cleanpass/eating_x2" / view / "0000.png", image)
+        pfm(root / "disparity/eating_x2" / view / "0000.pfm", truth)
     return w
 
 
@@ -205,9 +205,9 @@ def middlebury2003(root: Path) -> World:
 
 def crestereo(root: Path) -> World:
     w = world()
-    for eye, image, truth in (("left", w.left, w.disparity_left), ("right", w.right, w.disparity_right)):
-        jpeg(root / f"tree/0a1b_{eye}.jpg", image)
-        png(root / f"tree/0a1b_{eye}.disp.png", np.rint(truth * 32).astype(np.uint16))
+    for view, image, truth in (("left", w.left, w.disparity_left), ("right", w.right, w.disparity_right)):
+        jpeg(root / f"tree/0a1b_{view}.jpg", image)
+        png(root / f"tree/0a1b_{view}.disp.png", np.rint(truth * 32).astype(np.uint16))
     return w
 
 

@@ -1,0 +1,210 @@
+"""User assets: prepared in a guarded process, used in one split each, part of the data set."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import OpenEXR
+import pytest
+import trimesh
+
+from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
+from datagen.dataset.layout import Layout
+from datagen.dataset.manifest import read_manifest
+from datagen.recipe.assets import ImportedAssets, _import_folder, import_assets
+from datagen.rendering.estimate import estimate_run
+from datagen.verify.dataset_check import verify_dataset
+from scenes import FAMILIES, scene_from_json, scene_to_json
+from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture, use_store
+from stereoforge.commands.render import Render
+from stereoforge_kit.processes import Limits
+
+RNG = np.random.default_rng(0)
+
+
+def write_user_files(folder: Path) -> None:
+    for name in ("meshes", "textures", "environments"):
+        (folder / name).mkdir(parents=True)
+    meshes = folder / "meshes"
+    for k in range(4):
+        for suffix in ("obj", "ply", "glb", "stl"):
+            body = trimesh.creation.icosphere(subdivisions=1, radius=3.0 + k)
+            body.vertices += RNG.normal(size=body.vertices.shape) * 0.2 + 40
+            body.export(meshes / f"body_{k}.{suffix}")
+    (meshes / "empty.obj").write_text("# nothing\n")
+    (meshes / "garbage.glb").write_bytes(RNG.bytes(400))
+    (meshes / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\n" + "f 1 2 3\n" * 5)
+    header = "ply\nformat binary_little_endian 1.0\nelement vertex 9000000000\n"
+    (meshes / "huge.ply").write_text(
+        header + "property double x\nproperty double y\nproperty double z\nend_header\n"
+    )
+    (meshes / "leak.obj").write_text("mtllib ../../secret.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
+    for k in range(6):
+        cv2.imwrite(str(folder / f"textures/picture_{k}.png"), RNG.integers(0, 255, (30, 40, 3)))
+    (folder / "textures/broken.png").write_bytes(b"\x89PNG\r\n\x1a\nno")
+    sky = RNG.uniform(0.1, 2.0, (16, 32, 3)).astype(np.float32)
+    sky[3, 20] = 5000.0
+    cv2.imwrite(str(folder / "environments/sky.hdr"), sky)
+    planes = {name: np.ascontiguousarray(sky[::-1, :, k]) for k, name in enumerate("RGB")}
+    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION}, planes).write(str(folder / "environments/sky.exr"))
+
+
+@pytest.fixture(scope="module")
+def user(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("user")
+    write_user_files(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def imported(user: Path, tmp_path_factory: pytest.TempPathFactory) -> ImportedAssets:
+    store = tmp_path_factory.mktemp("store")
+    found = import_assets(
+        store, meshes=user / "meshes", textures=user / "textures", environments=user / "environments"
+    )
+    use_store(store)
+    return found
+
+
+def test_usable_files_are_normalised_and_the_others_skipped_with_a_sentence(imported: ImportedAssets) -> None:
+    pool = imported.pool
+    assert [len(kind) for kind in (pool.meshes, pool.textures, pool.environments)] == [16, 6, 2]
+    for asset in pool.meshes:
+        mesh = UserMesh(asset.sha256).mesh()
+        assert np.abs(mesh.vertices).max() == pytest.approx(1.0)
+        assert len(mesh.triangles) == 80
+        assert mesh.corner_uv.shape == (80, 3, 2)
+    said = {Path(sentence.split(": ")[0]).name: sentence for sentence in imported.skipped}
+    assert said.keys() == {"empty.obj", "garbage.glb", "flat.obj", "huge.ply", "leak.obj", "broken.png"}
+    assert all("\n" not in sentence and len(sentence) < 500 for sentence in said.values())
+    assert "no surface" in said["flat.obj"]
+    picture = UserTexture(pool.textures[0].sha256).image()
+    assert picture.shape == (30, 40, 3)
+    skies = [UserEnvironment(asset.sha256).radiance() for asset in pool.environments]
+    for sky in skies:
+        assert sky.mean() == pytest.approx(0.5, rel=1e-3)
+        assert sky.max() > 100 * np.median(sky)
+
+
+def test_each_file_is_in_one_split_and_which_one_depends_on_its_content_only() -> None:
+    assets = tuple(Asset(f"{k}.obj", f"{int(RNG.integers(2**32)):08x}" + "0" * 56) for k in range(2000))
+    pools = [AssetPool(meshes=assets).of_split(split).meshes for split in ("train", "val", "test")]
+    assert sum(map(len, pools)) == 2000
+    assert [round(len(pool) / 2000, 1) for pool in pools] == [0.8, 0.1, 0.1]
+    assert not set(pools[0]) & set(pools[1]) | set(pools[0]) & set(pools[2]) | set(pools[1]) & set(pools[2])
+
+
+def test_scenes_of_a_split_use_that_split_s_files(imported: ImportedAssets) -> None:
+    config = FAMILIES["flying_things"].config(
+        flying_objects=(15, 15), background_objects=(1, 1), user_share=0.8
+    )
+    recipe = Recipe(config, {"train": 1}, assets=imported.pool)
+    for split in ("train", "val", "test"):
+        scene = recipe.sample(split, 0)
+        used = {thing.shape.sha256 for thing in scene.objects if isinstance(thing.shape, UserMesh)}
+        allowed = {asset.sha256 for asset in imported.pool.of_split(split).meshes}
+        assert used <= allowed
+        assert bool(used) == bool(allowed)
+        assert scene_from_json(scene_to_json(scene)) == scene
+    assert Recipe(config, {"train": 1}).sample("train", 0).objects
+
+
+@pytest.mark.parametrize("family", ["driving", "monkaa", "sintel"])
+def test_every_family_takes_the_user_s_files_in_the_place_of_its_own(
+    family: str, imported: ImportedAssets
+) -> None:
+    recipe = Recipe(FAMILIES[family].config(), {"train": 1})
+    own = Recipe(recipe.world, {"train": 1}, assets=imported.pool)
+    meshes, pictures, changed = set(), set(), 0
+    for index in range(3):
+        before, after = recipe.sample("train", index), own.sample("train", index)
+        assert scene_from_json(scene_to_json(after)) == after
+        pictures |= {m.color.sha256 for m in after.materials if isinstance(m.color, UserTexture)}
+        for old, new in zip(before.objects, after.objects, strict=True):
+            if not isinstance(new.shape, UserMesh):
+                assert new == old
+                continue
+            meshes.add(new.shape.sha256)
+            changed += 1
+            inside, room = (thing.shape.mesh().vertices * thing.scale_m for thing in (new, old))
+            offset = np.linalg.inv(old.motion.pose(0.0)) @ new.motion.pose(0.0)
+            assert (np.abs(inside + offset[:3, 3]).max(axis=0) <= np.abs(room).max(axis=0) + 1e-6).all()
+            assert (inside + offset[:3, 3])[:, 2].min() >= -np.abs(room[:, 2]).max() - 1e-6
+    assert changed > 5
+    assert meshes <= {asset.sha256 for asset in imported.pool.of_split("train").meshes}
+    assert pictures
+    assert pictures <= {asset.sha256 for asset in imported.pool.of_split("train").textures}
+
+
+def crash_or_grow(path: Path) -> dict[str, np.ndarray]:
+    if path.stem == "crash":
+        ctypes.string_at(0)
+    if path.stem == "greedy":
+        return {"held": np.ones(1 << 28)}
+    if path.stem == "slow":
+        time.sleep(600)
+    return {"fine": np.zeros(1)}
+
+
+@pytest.mark.slow
+def test_a_file_that_brings_its_reader_down_is_skipped(tmp_path: Path) -> None:
+    for number, name in enumerate(("crash", "fine", "greedy", "slow")):
+        (tmp_path / f"{name}.stl").write_bytes(bytes([number]))
+    skipped: list[str] = []
+    limits = Limits(timeout_s=2.0, memory_bytes=900 << 20)
+    (asset,) = _import_folder(tmp_path, (".stl",), crash_or_grow, limits, tmp_path, skipped)
+    assert asset.name == "fine.stl"
+    crash, greedy, slow = (sentence.removeprefix(f"{tmp_path}/") for sentence in skipped)
+    assert crash == "crash.stl: cannot be read, its process crashed (SIGSEGV)"
+    assert greedy.startswith("greedy.stl: ")
+    assert "memory" in greedy or "used" in greedy
+    assert slow == "slow.stl: cannot be read, ran longer than its limit of 2 s"
+
+
+def test_unknown_folders_and_files_are_refused(user: Path, tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="there is no such folder"):
+        import_assets(tmp_path / "store", meshes=tmp_path / "nowhere")
+    with pytest.raises(DatasetError, match="no usable file"):
+        import_assets(tmp_path / "store", textures=user / "environments")
+    with pytest.raises(ValueError, match="in no store"):
+        UserMesh("ab" * 32).mesh()
+    for named in (UserMesh("../../etc/passwd").mesh, lambda: Asset("x", "../../etc/passwd")):
+        with pytest.raises(ValueError, match="named by its SHA-256"):
+            named()
+
+
+def test_a_data_set_carries_the_files_it_uses(user: Path, tmp_path: Path) -> None:
+    out, recipe = tmp_path / "set", tmp_path / "recipe.yaml"
+    recipe.write_text(
+        "world: {family: flying_things, width: 96, height: 54, flying_objects: [6, 6], "
+        "background_objects: [2, 2], background_materials: [2, 2], user_share: 1.0}\n"
+        "scenes: {train: 1}\nsamples: 1\nseed: 1\n"
+    )
+    folders = {name: user / name for name in ("meshes", "textures", "environments")}
+    Render(out=str(out), recipe=recipe, workers=1, **folders).run()
+    written = read_recipe(out / "recipe.yaml")
+    assert len(written.assets.meshes) == 16
+    statistics = read_manifest(Layout(out).manifest("train", 0)).statistics
+    assert any(name.startswith("body_") for name in statistics["assets"])
+    assert any(name.startswith("picture_") for name in statistics["assets"])
+    record = json.loads(Layout(out).scene_record("train", 0).read_text())
+    assert any(thing["shape"]["kind"] == "UserMesh" for thing in record["objects"])
+    # Its recipe elsewhere lacks them, and is refused before anything is made.
+    with pytest.raises(
+        DatasetError, match="give the folders of your meshes, textures and environments again"
+    ):
+        render_dataset(written, tmp_path / "other")
+    assert not (tmp_path / "other").exists()
+    with pytest.raises(DatasetError, match="a folder, not a URL"):
+        render_dataset(written, "memory://set")
+    assert estimate_run(replace(written, scenes={"train": 2}), out).frames == 1
+    # Elsewhere, and without the folders the files came from, the set is still whole.
+    moved = out.rename(tmp_path / "moved")
+    assert verify_dataset(moved, workers=1).problems == ()
+    assert StereoDataset(moved, "train")[0].left.std() > 5
