@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from pathlib import Path
 from typing import Any, Protocol, overload
 
 import numpy as np
@@ -139,6 +140,13 @@ class FileFrame:
             return None
         disparity = self._checked("right disparity", self.read_disparity_right())
         return drop_impossible(disparity, self.disparity_noise_px)[0]
+
+    @property
+    def disparity_file(self) -> Path | None:
+        """The file of the left disparity; None where it is a part of another one."""
+        read = self.read_disparity_left
+        paths = [value for value in read.args if isinstance(value, Path)] if isinstance(read, partial) else []
+        return paths[0] if paths else None
 
     @property
     def gradient_left(self) -> NDArray[np.float32]:
