@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import shown
-from stereoforge.inputs.images import read_color_image
+from stereoforge.inputs.images import read_color_images
 from stereoforge.progress import console
 
 if TYPE_CHECKING:
@@ -73,18 +73,19 @@ class Refine:
     def run(self) -> None:
         """Refine the pair and write every output into the folder."""
         self._check()
-        left, right = read_color_image(self.left), read_color_image(self.right)
+        left, right, remarks = read_color_images(self.left, self.right)
         from stereoforge.inputs.disparity_files import read_disparity
         from stereoforge.pipelines.prediction import open_settings, predict_pair
 
-        given, remarks = None, []
+        given = None
         if self.disparity is not None:
             size = (left.shape[0], left.shape[1])
-            disparity, remarks = read_disparity(self.disparity, size)
+            disparity, said = read_disparity(self.disparity, size)
             other = None
+            remarks += said
             if self.disparity_right is not None:
-                other, more = read_disparity(self.disparity_right, size)
-                remarks += more
+                other, said = read_disparity(self.disparity_right, size)
+                remarks += said
             given = disparity, other
         predictor: Literal["networks", "sgbm"] = "sgbm" if given is not None else self.predictor
         settings = open_settings(self.parameters, self.weights, predictor)
