@@ -19,7 +19,7 @@ import fsspec
 
 from datagen.errors import DatasetError, FormatError
 from datagen.formats.limits import MAX_FILE_BYTES
-from stereoforge_kit.files import replacing
+from stereoforge_kit.files import is_data, replacing
 
 CACHE_VARIABLE = "STEREOFORGE_CACHE"
 """The environment variable that names the cache folder."""
@@ -86,7 +86,7 @@ def shard_index(path: Path) -> ShardIndex:
         with _HeaderFile(path) as file, tarfile.open(fileobj=file, mode="r:") as shard:
             size = os.fstat(file.fileno()).st_size
             for entry in shard:
-                if not entry.isfile():
+                if not entry.isfile() or not is_data(entry.name):
                     continue
                 bounded = 0 <= entry.size <= min(MAX_FILE_BYTES, size - entry.offset_data)
                 if not bounded or entry.issparse():

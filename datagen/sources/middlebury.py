@@ -22,6 +22,7 @@ from datagen.formats.picture import read_picture
 from datagen.ground_truth.from_disparity import occlusion_from_mask
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+from stereoforge_kit.files import matching
 
 ETH3D_IMAGES = "two_view_training"
 """ETH3D's folder of images: its scenes are encoded as these are (`datagen.sources.eth3d`)."""
@@ -79,15 +80,14 @@ def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
 
 
 def _frames(root: Path) -> Iterator[FileFrame]:
-    for pattern in ("im0.png", "*/im0.png", "*/*/im0.png"):
-        for image in sorted(root.glob(pattern)):
-            name = image.parent.relative_to(root).as_posix()
-            scene_name = _VARIANT.sub("", image.parent.name)
-            frame = scene_frame(
-                image.parent.name if name == "." else name, scene_name, image.parent, image.parent
-            )
-            if frame is not None:
-                yield frame
+    for image in matching(root, ("im0.png", "*/im0.png", "*/*/im0.png")):
+        name = image.parent.relative_to(root).as_posix()
+        scene_name = _VARIANT.sub("", image.parent.name)
+        frame = scene_frame(
+            image.parent.name if name == "." else name, scene_name, image.parent, image.parent
+        )
+        if frame is not None:
+            yield frame
 
 
 FORMATS = (SourceFormat("middlebury", "Middlebury", _recognises, _find),)

@@ -24,6 +24,7 @@ from datagen.formats import read_pfm
 from datagen.formats.picture import read_picture
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+from stereoforge_kit.files import matching
 
 PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
 PARTS = {"train": "TRAIN", "test": "TEST"}
@@ -52,11 +53,11 @@ def _flying_things(root: Path, images: str) -> bool:
 
 
 def _driving(root: Path, images: str) -> bool:
-    return any(True for _ in root.glob(f"{images}/*mm_focallength/*/*/left"))
+    return bool(matching(root, f"{images}/*mm_focallength/*/*/left"))
 
 
 def _monkaa(root: Path, images: str) -> bool:
-    return any(True for _ in root.glob(f"{images}/*/left"))
+    return bool(matching(root, f"{images}/*/left"))
 
 
 def _recognises(root: Path, render_pass: str, has_images: Callable[[Path, str], bool]) -> bool:
@@ -74,7 +75,7 @@ def _find(
 
 
 def _frames(images: Path, truths: Path, pattern: str, scene_of: Callable[[str], str]) -> Iterator[FileFrame]:
-    for truth in sorted(truths.glob(f"{pattern}/left/*.pfm")):
+    for truth in matching(truths, f"{pattern}/left/*.pfm"):
         scene = truth.parent.parent.relative_to(truths)
         yield FileFrame(
             name=f"{scene.as_posix()}/{truth.stem}",

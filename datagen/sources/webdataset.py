@@ -32,6 +32,7 @@ from datagen.formats.png import decode_png
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.files import matching
 
 INDEX_NAME = "index.json"
 """The file that lists the shards of a folder, their samples and their SHA-256."""
@@ -85,7 +86,7 @@ class ShardFrames(Sequence[StereoFrame]):
 
 
 def _recognises(root: Path) -> bool:
-    names = [root.name] if root.is_file() else (path.name for path in root.glob("*.tar"))
+    names = [root.name] if root.is_file() else (path.name for path in matching(root, "*.tar"))
     return any(_SHARD_NAME.fullmatch(name) for name in names)
 
 

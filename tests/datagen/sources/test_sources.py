@@ -391,6 +391,40 @@ class TestShards:
             open_source("webdataset:memory://nothing/here").frames("train")
 
 
+def test_linked_folders_are_not_lost(tmp_path: Path) -> None:
+    """Two of CREStereo's four folders on another disk; only `Path.rglob` of Python 3.13 follows links."""
+    published.crestereo(tmp_path / "set")
+    shutil.copytree(tmp_path / "set/tree", tmp_path / "set/hole")
+    for name in ("reflective", "shapenet"):
+        shutil.copytree(tmp_path / "set/tree", tmp_path / "disk" / name)
+        (tmp_path / "set" / name).symlink_to(tmp_path / "disk" / name)
+    names = [frame.name for frame in open_source(tmp_path / "set").frames("test")]
+    assert names == ["hole/0a1b", "reflective/0a1b", "shapenet/0a1b", "tree/0a1b"]
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_droppings_are_no_frames(name: str, tmp_path: Path) -> None:
+    """What macOS and Windows leave beside every file, and what an archive made on macOS has in it."""
+    SETS[name](tmp_path)
+    before = [frame.name for frame in open_source(tmp_path).frames("train")]
+    for path in [path for path in tmp_path.rglob("*") if path.is_file()]:
+        path.with_name(f"._{path.name}").write_bytes(b"Mac OS X")
+        (path.parent / ".DS_Store").write_bytes(b"Bud1")
+        (path.parent / "Thumbs.db").write_bytes(b"")
+        (path.parent / "desktop.ini").write_bytes(b"")
+    shutil.copytree(tmp_path, tmp_path / "__MACOSX")
+    source = open_source(tmp_path)
+    assert (source.format.name, [frame.name for frame in source.frames("train")]) == (name, before)
+    assert problem_of(tmp_path) is None
+
+
+def test_droppings_in_shards_are_no_samples(tmp_path: Path) -> None:
+    members = shard_members(world())
+    samples = {"./train-0000-0006": members, "./._train-0000-0006": members, ".DS_Store": {"x": b""}}
+    (tmp_path / "train-000000.tar").write_bytes(shard(samples))
+    assert [frame.name for frame in open_source(tmp_path).frames("train")] == ["train-0000-0006"]
+
+
 def test_frames_do_not_pile_up(tmp_path: Path) -> None:
     """A frame keeps what it has read, the list of frames does not."""
     published.monkaa(tmp_path)
