@@ -1,6 +1,7 @@
 """WebDataset shards as `stereoforge export` writes them (docs/conventions.md).
 
-The shards are `<split>-%06d.tar`, local or at any URL that fsspec opens. Their samples `<split>-<scene>-<frame>` have
+The shards are `<split>-%06d.tar`, local or at any URL that fsspec opens: a folder of them, or as WebDataset names
+them, `set/train-{000000..000003}.tar` or `set/train-*.tar`. Their samples `<split>-<scene>-<frame>` have
 members that are encoded as the files of the native tree. Gradients are derived from the disparity, which gives the same
 numbers as the native tree has. Everything else is read.
 """
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 
 from datagen.dataset.layout import SPLITS
 from datagen.dataset.manifest import OWN_DIGEST, FileEntry, check_seal, file_entries
-from datagen.dataset.shards import list_shards, local_copy, read_sample_member, shard_index
+from datagen.dataset.shards import list_shards, local_copy, names_shards, read_sample_member, shard_index
 from datagen.errors import DatasetError, FormatError
 from datagen.formats.occlusion import labels_of
 from datagen.formats.pfm import decode_pfm
@@ -95,8 +96,12 @@ def _find(location: str, split: str) -> Sequence[StereoFrame]:
     names = None if index is None else index.shards
     shards = list_shards(location) if names is None else [f"{location.rstrip('/')}/{name}" for name in names]
     samples: list[tuple[str, str]] = []
-    for shard in sorted(shards):
+    for shard in sorted(set(shards)):
         name = _SHARD_NAME.fullmatch(shard.rpartition("/")[2])
+        if name is None and names_shards(location):
+            raise DatasetError(
+                f"{shard}: is not named after its split and number as in train-000000.tar (train, val or test)"
+            )
         if name and name[1] == split:
             keys = shard_index(local_copy(shard)) if names is None else names[name[0]]
             samples += ((shard, key) for key in keys)
@@ -115,7 +120,7 @@ class ShardSetIndex:
 
 def read_index(location: str) -> ShardSetIndex | None:
     """The index of a folder of shards, None if there is none. Raises DatasetError for an index that is damaged."""
-    if location.endswith(".tar"):
+    if names_shards(location):
         return None
     url = f"{location.rstrip('/')}/{INDEX_NAME}"
     try:

@@ -1,5 +1,6 @@
 """Every reader on files in the published encoding: values, signs, rows, holes, labels; and the choice of reader."""
 
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -366,8 +367,6 @@ class TestShards:
         self.check(open_source(f"webdataset:{url}"))
 
     def test_url_with_index_fetches_what_is_read(self, url: str, tmp_path: Path) -> None:
-        import json
-
         names = {name: list(samples) for name, samples in self.samples().items()}
         fsspec.filesystem("memory").pipe_file(
             f"{url.removeprefix('memory:/')}/index.json", json.dumps({"shards": names}).encode()
@@ -380,6 +379,43 @@ class TestShards:
         assert frames.groups == [3, 2]  # type: ignore[attr-defined]
         assert frames[1:4].groups == [2, 1]  # type: ignore[attr-defined]
         self.check(open_source(f"webdataset:{url}"))
+
+    @pytest.mark.parametrize("indexed", [False, True])
+    @pytest.mark.parametrize("folder", ["wds[v1]", "wds{a,b}", "wds*", "wds?"])
+    def test_a_folder_s_name_is_no_pattern(self, folder: str, indexed: bool, tmp_path: Path) -> None:
+        place = tmp_path / folder
+        place.mkdir()
+        for name, samples in self.samples().items():
+            (place / name).write_bytes(shard(samples))
+        if indexed:
+            names = {name: list(samples) for name, samples in self.samples().items()}
+            (place / "index.json").write_text(json.dumps({"shards": names}))
+        for source in (f"webdataset:{place}", str(place)):
+            self.check(open_source(source))
+        for pattern in ("train-{000000..000001}.tar", "*.tar", "{train-000000,train-000001,val-000000}.tar"):
+            assert len(open_source(f"webdataset:{place}/{pattern}").frames("train")) == 5
+
+    @pytest.mark.parametrize(
+        ("pattern", "count"),
+        [
+            ("train-{000000..000001}.tar", 5),
+            ("train-{000001..000001}.tar", 2),
+            ("train-00000[1-9].tar", 2),
+            ("*.tar", 5),
+            ("{train,val}-000000.tar", 3),
+        ],
+    )
+    def test_shards_are_named_as_webdataset_names_them(self, url: str, pattern: str, count: int) -> None:
+        assert len(open_source(f"webdataset:{url}/{pattern}").frames("train")) == count
+
+    def test_shards_that_are_named_and_not_there_are_sentences(self, url: str, tmp_path: Path) -> None:
+        with pytest.raises(DatasetError, match=r"train-000002\.tar"):
+            open_source(f"webdataset:{url}/train-{{000000..000002}}.tar").frames("train")
+        (tmp_path / "mine.tar").write_bytes(shard({}))
+        with pytest.raises(DatasetError, match=r"mine\.tar: is not named after its split"):
+            open_source(f"webdataset:{tmp_path}/*.tar").frames("train")
+        with pytest.raises(DatasetError, match="more than 1000000 files"):
+            open_source(f"webdataset:{tmp_path}/train-{{000000..999999999}}.tar").frames("train")
 
     def test_a_damaged_index_and_a_missing_bucket_are_sentences(self, url: str) -> None:
         fsspec.filesystem("memory").pipe_file(f"{url.removeprefix('memory:/')}/index.json", b'{"shards": 3}')
