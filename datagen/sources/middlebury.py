@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats import read_pfm, read_png
+from datagen.formats import read_pfm_disparity, read_png
 from datagen.formats.picture import read_picture
 from datagen.ground_truth.from_disparity import occlusion_from_mask
 from datagen.sources.registry import SourceFormat
@@ -29,7 +29,7 @@ ETH3D_IMAGES = "two_view_training"
 _SHOWN_BY_BOTH = 255
 _VARIANT = re.compile(r"(?<=[a-z])\d?[ELP]?(-(im)?perfect)?$")
 """What tells pictures of one scene apart: the direction of view, the exposure, the light, the rectification."""
-_DISPARITY_NAMES = ("disp{}GT.pfm", "disp{}.pfm")
+_DISPARITY_NAMES = ("disp{}GT.pfm", "disp{}.pfm", "disp{}GT.PFM", "disp{}.PFM")
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
@@ -37,7 +37,7 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
 
     Raises FormatError for a file that is none.
     """
-    disparity = read_pfm(path)
+    disparity = read_pfm_disparity(path)
     disparity[np.isinf(disparity)] = np.nan
     return disparity
 

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats import read_pfm
+from datagen.formats import read_pfm_disparity
 from datagen.formats.picture import read_picture
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
@@ -38,7 +38,7 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
 
     Raises FormatError for a file that is none.
     """
-    disparity = read_pfm(path)
+    disparity = read_pfm_disparity(path)
     if np.nanmedian(disparity) < 0:
         disparity = -disparity
     impossible = ~((disparity >= 0) & (disparity <= disparity.shape[1]))
@@ -75,7 +75,7 @@ def _find(
 
 
 def _frames(images: Path, truths: Path, pattern: str, scene_of: Callable[[str], str]) -> Iterator[FileFrame]:
-    for truth in matching(truths, f"{pattern}/left/*.pfm"):
+    for truth in matching(truths, f"{pattern}/left/*.[pP][fF][mM]"):
         scene = truth.parent.parent.relative_to(truths)
         yield FileFrame(
             name=f"{scene.as_posix()}/{truth.stem}",

@@ -28,7 +28,7 @@ from datagen.dataset.manifest import OWN_DIGEST, FileEntry, check_seal, file_ent
 from datagen.dataset.shards import list_shards, local_copy, names_shards, read_sample_member, shard_index
 from datagen.errors import DatasetError, FormatError
 from datagen.formats.occlusion import labels_of
-from datagen.formats.pfm import decode_pfm
+from datagen.formats.pfm import decode_pfm, first_channel
 from datagen.formats.png import decode_png
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
@@ -164,8 +164,8 @@ def _frame(shard: str, key: str) -> FileFrame:
         scene_name=scene_of(key),
         read_left=partial(read, "left.png", decode_png),
         read_right=partial(read, "right.png", decode_png),
-        read_disparity_left=partial(read, "disparity_left.pfm", decode_pfm),
-        read_disparity_right=partial(read, "disparity_right.pfm", decode_pfm),
+        read_disparity_left=partial(read, "disparity_left.pfm", _decode_disparity),
+        read_disparity_right=partial(read, "disparity_right.pfm", _decode_disparity),
         read_occlusion_left=partial(read, "occlusion_left.png", _decode_occlusion),
         read_object_index_left=partial(read, "object_index_left.png", decode_png),
     )
@@ -173,6 +173,10 @@ def _frame(shard: str, key: str) -> FileFrame:
 
 def _decode_occlusion(data: bytes, origin: str) -> NDArray[np.uint8]:
     return labels_of(decode_png(data, origin), origin)
+
+
+def _decode_disparity(data: bytes, origin: str) -> NDArray[np.float32]:
+    return first_channel(decode_pfm(data, origin), origin)
 
 
 def _read(shard: str, key: str, member: str, decode: Any) -> Any:

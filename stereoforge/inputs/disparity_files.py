@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats import read_pfm
+from datagen.formats import read_pfm_disparity
 from datagen.sources.kitti import read_disparity as read_kitti
 from stereoforge.errors import CommandError
 
-READERS = {".pfm": read_pfm, ".png": read_kitti}
+READERS = {".pfm": read_pfm_disparity, ".png": read_kitti}
 """By the file's ending."""
 
 
@@ -34,8 +34,7 @@ def read_disparity(path: Path, size: tuple[int, int]) -> NDArray[np.float32]:
     disparity = READERS[path.suffix.lower()](path)
     if disparity.shape != size:
         got = "x".join(map(str, disparity.shape[1::-1]))
-        kind = "" if disparity.ndim == 2 else f" of {disparity.shape[2]} channels"
-        raise CommandError(f"{path}: is {got}{kind}, the pictures are {size[1]}x{size[0]}")
+        raise CommandError(f"{path}: is {got}, the pictures are {size[1]}x{size[0]}")
     disparity = np.where(np.isfinite(disparity) & (disparity >= 0), disparity, np.nan).astype(np.float32)
     if np.isnan(disparity).all():
         raise CommandError(f"{path}: holds no disparity, every pixel is marked as having none")

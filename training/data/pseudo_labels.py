@@ -15,13 +15,13 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats import read_pfm
+from datagen.formats import read_pfm_disparity
 from datagen.sources.kitti import read_disparity as read_kitti_disparity
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
 from training.data.pipeline import Source
 from training.errors import TrainingError
 
-_READERS = {".pfm": read_pfm, ".png": read_kitti_disparity}
+_READERS = {".pfm": read_pfm_disparity, ".png": read_kitti_disparity}
 
 
 def with_pseudo_labels(sources: Sequence[Source], folder: Path) -> Source:
@@ -75,7 +75,7 @@ class PseudoLabelFrames(Sequence[StereoFrame]):
 
 
 def _file_of(folder: Path, name: str) -> Path:
-    for suffix in _READERS:
+    for suffix in (*_READERS, *map(str.upper, _READERS)):
         path = folder / f"{name}{suffix}"
         if path.is_file():
             return path
@@ -85,6 +85,6 @@ def _file_of(folder: Path, name: str) -> Path:
 
 
 def _read(path: Path) -> NDArray[np.float32]:
-    disparity = _READERS[path.suffix](path)
+    disparity = _READERS[path.suffix.lower()](path)
     disparity[~np.isfinite(disparity)] = np.nan
     return disparity

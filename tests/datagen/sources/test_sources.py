@@ -11,6 +11,7 @@ import pytest
 
 from datagen import DatasetError
 from datagen.dataset.shards import CACHE_VARIABLE
+from datagen.formats import read_pfm, write_pfm
 from datagen.ground_truth.from_disparity import derive_occlusion
 from datagen.sources.registry import DataSource, open_source, source_formats
 from datagen.sources.webdataset import scene_of
@@ -452,6 +453,16 @@ def test_droppings_are_no_frames(name: str, tmp_path: Path) -> None:
     source = open_source(tmp_path)
     assert (source.format.name, [frame.name for frame in source.frames("train")]) == (name, before)
     assert problem_of(tmp_path) is None
+
+
+@pytest.mark.parametrize("name", ["flyingthings3d", "monkaa", "middlebury", "eth3d"])
+def test_endings_in_upper_case_and_three_channels(name: str, tmp_path: Path) -> None:
+    SETS[name](tmp_path)
+    before = open_source(tmp_path).frames("train")[0].disparity_left
+    for path in list(tmp_path.rglob("*.pfm")):
+        write_pfm(path.with_suffix(".PFM"), np.repeat(read_pfm(path)[..., None], 3, axis=2))
+        path.unlink()
+    np.testing.assert_array_equal(open_source(tmp_path).frames("train")[0].disparity_left, before)
 
 
 def test_droppings_in_shards_are_no_samples(tmp_path: Path) -> None:
