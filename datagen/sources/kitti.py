@@ -134,8 +134,8 @@ def testing_frames(source: DataSource) -> Sequence[StereoFrame]:
     """
     folder = Path(source.location) / "testing"
     for edition in _EDITIONS[source.format.name]:
-        if (folder / edition.left).is_dir():
-            images = matching(folder / edition.left, _REFERENCE_FRAMES)
+        images = matching(folder / edition.left, _REFERENCE_FRAMES)
+        if images:
             return FileFrames(_testing_frame(left, folder / edition.right / left.name) for left in images)
     return []
 

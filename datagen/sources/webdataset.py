@@ -215,4 +215,4 @@ def _description(shard: str, key: str) -> dict[str, Any]:
     return description
 
 
-FORMATS = (SourceFormat("webdataset", "WebDataset shards", _recognises, _find, SPLITS),)
+FORMATS = (SourceFormat("webdataset", "WebDataset shards", _recognises, _find, SPLITS, takes_patterns=True),)

@@ -266,12 +266,28 @@ def test_wrong_sources_are_sentences(tmp_path: Path) -> None:
         open_source(tmp_path)
     with pytest.raises(DatasetError, match="has no frame with ground truth in the layout of KITTI 2015"):
         open_source(f"kitti2015:{tmp_path}").frames("train")
+    with pytest.raises(DatasetError, match=f"^{tmp_path}/gone: there is no such folder$"):
+        open_source(f"kitti2015:{tmp_path}/gone")
+    with pytest.raises(DatasetError, match=r"gone\.tar: there is no such file$"):
+        open_source(f"webdataset:{tmp_path}/gone.tar")
+    with pytest.raises(DatasetError, match=r"there is no format kiti2015; there are .*kitti2015") as caught:
+        open_source(f"kiti2015:{tmp_path}")
+    assert len(str(caught.value)) < 300
     with pytest.raises(DatasetError, match="say what is there, for example webdataset:s3://bucket/set"):
         open_source("s3://bucket/set")
     published.kitti2015(tmp_path / "a")
     published.sintel(tmp_path / "a")
     with pytest.raises(DatasetError, match="looks like KITTI 2015 and MPI Sintel"):
         open_source(tmp_path / "a")
+
+
+def test_the_home_folder_after_a_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    published.kitti2015(tmp_path / "sets/kitti")
+    for source in ("kitti2015:~/sets/kitti", "~/sets/kitti", "kitti2015:~/sets/kitti#0-0"):
+        assert len(open_source(source).frames("train")) == 1
+    with pytest.raises(DatasetError, match="~nobody-at-all/x: there is no such folder"):
+        open_source("kitti2015:~nobody-at-all/x")
 
 
 @pytest.mark.parametrize(
