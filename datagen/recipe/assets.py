@@ -27,6 +27,7 @@ from datagen.formats.picture import read_picture
 from scenes.geometry.building import solid
 from scenes.user_assets.pool import Asset, AssetPool
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.files import walk_files
 from stereoforge_kit.processes import Limits
 
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
@@ -93,9 +94,12 @@ def _import_folder(
 ) -> tuple[Asset, ...]:
     if not folder.is_dir():
         raise DatasetError(f"{folder}: there is no such folder")
-    paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in suffixes and path.is_file())
+    paths = [path for path in walk_files(folder) if path.suffix.lower() in suffixes]
     originals: dict[str, Path] = {}
     for path in paths:
+        if not path.is_file():
+            skipped.append(f"{path}: is no file, or a link to none")
+            continue
         if path.stat().st_size > MAX_FILE_BYTES:
             skipped.append(f"{path}: is larger than {MAX_FILE_BYTES >> 20} MB")
             continue

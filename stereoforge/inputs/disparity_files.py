@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats import read_pfm
+from datagen.formats import read_pfm_disparity
 from datagen.formats.impossible_disparity import PREDICTION_NOISE_PX, drop_impossible
 from datagen.sources.kitti import read_disparity as read_kitti
 from stereoforge.errors import CommandError
 
-READERS = {".pfm": read_pfm, ".png": read_kitti}
+READERS = {".pfm": read_pfm_disparity, ".png": read_kitti}
 """By the file's ending."""
 
 
@@ -40,8 +40,7 @@ def read_disparity(path: Path, size: tuple[int, int]) -> tuple[NDArray[np.float3
     disparity = READERS[path.suffix.lower()](path)
     if disparity.shape != size:
         got = "x".join(map(str, disparity.shape[1::-1]))
-        kind = "" if disparity.ndim == 2 else f" of {disparity.shape[2]} channels"
-        raise CommandError(f"{path}: is {got}{kind}, the pictures are {size[1]}x{size[0]}")
+        raise CommandError(f"{path}: is {got}, the pictures are {size[1]}x{size[0]}")
     disparity, impossible = drop_impossible(disparity, PREDICTION_NOISE_PX)
     sign = "; is the sign the other way round?" if impossible.negative > MOSTLY else ""
     if np.isnan(disparity).all():

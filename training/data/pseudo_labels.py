@@ -12,14 +12,14 @@ from functools import partial
 from pathlib import Path
 from typing import overload
 
-from datagen.formats import read_pfm
+from datagen.formats import read_pfm_disparity
 from datagen.formats.impossible_disparity import PREDICTION_NOISE_PX
 from datagen.sources.kitti import read_disparity as read_kitti_disparity
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
 from training.data.pipeline import Source
 from training.errors import TrainingError
 
-_READERS = {".pfm": read_pfm, ".png": read_kitti_disparity}
+_READERS = {".pfm": read_pfm_disparity, ".png": read_kitti_disparity}
 
 
 def with_pseudo_labels(sources: Sequence[Source], folder: Path) -> Source:
@@ -68,13 +68,13 @@ class PseudoLabelFrames(Sequence[StereoFrame]):
             scene_name=frame.scene_name,
             read_left=partial(getattr, frame, "left"),
             read_right=partial(getattr, frame, "right"),
-            read_disparity_left=partial(_READERS[self._files[index].suffix], self._files[index]),
+            read_disparity_left=partial(_READERS[self._files[index].suffix.lower()], self._files[index]),
             disparity_noise_px=PREDICTION_NOISE_PX,
         )
 
 
 def _file_of(folder: Path, name: str) -> Path:
-    for suffix in _READERS:
+    for suffix in (*_READERS, *map(str.upper, _READERS)):
         path = folder / f"{name}{suffix}"
         if path.is_file():
             return path

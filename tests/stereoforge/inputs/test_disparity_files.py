@@ -53,21 +53,30 @@ def test_the_other_sign_is_guessed(tmp_path: Path) -> None:
     assert read_disparity(path, (1, 3))[1][0].endswith("is the sign the other way round?")
 
 
+def test_three_channels_that_are_alike_are_one(tmp_path: Path) -> None:
+    disparity = np.array([[1.5, NAN, 2], [3, 4, 5]], np.float32)
+    write_pfm(tmp_path / "a.PFM", np.repeat(disparity[..., None], 3, axis=2))
+    np.testing.assert_array_equal(read_disparity(tmp_path / "a.PFM", (2, 3)), disparity)
+
+
 def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
     write_pfm(tmp_path / "nothing.pfm", np.full((2, 3), np.inf, np.float32))
-    write_pfm(tmp_path / "color.pfm", np.zeros((2, 3, 3), np.float32))
+    write_pfm(tmp_path / "color.pfm", np.arange(18, dtype=np.float32).reshape(2, 3, 3))
     write_png(tmp_path / "grey.png", np.zeros((2, 3), np.uint8))
     (tmp_path / "cut.pfm").write_bytes(b"Pf\n3 2\n-1.0\n1234")
     (tmp_path / "map.tif").write_bytes(b"")
     for name, reason in (
         ("nothing.pfm", "holds no disparity"),
-        ("color.pfm", "3x2 of 3 channels"),
         ("map.tif", r"\.pfm or a 16-bit \.png"),
         ("gone.pfm", "no such file"),
     ):
         with pytest.raises(CommandError, match=f"{name}: .*{reason}"):
             read_disparity(tmp_path / name, (2, 3))
-    for name, reason in (("grey.png", "16-bit grey PNG"), ("cut.pfm", "header promises")):
+    for name, reason in (
+        ("grey.png", "16-bit grey PNG"),
+        ("cut.pfm", "header promises"),
+        ("color.pfm", "three channels that differ"),
+    ):
         with pytest.raises(DatasetError, match=f"{name}: .*{reason}"):
             read_disparity(tmp_path / name, (2, 3))
     write_pfm(tmp_path / "small.pfm", np.ones((2, 3), np.float32))

@@ -327,7 +327,7 @@ def test_recipes_for_sparse_real_data(run: Path, tmp_path: Path) -> None:
 
     for index in range(2):
         dense = random_pair(np.random.default_rng(index), 80, 140).disparity_left
-        published.pfm(tmp_path / f"pseudo/{index:06d}_10.pfm", dense)
+        published.pfm(tmp_path / f"pseudo/{index:06d}_10.{'pfm' if index else 'PFM'}", dense)
     seen: list[float] = []
     with pytest.MonkeyPatch.context() as patch:
         loss = GradNetTask.loss
