@@ -7,7 +7,7 @@ are registered subclasses, so a scene file can build data but never run code.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
@@ -22,7 +22,7 @@ import scenes.shapes
 import scenes.textures
 from scenes.family import FamilyConfig
 from scenes.registry import FAMILIES
-from scenes.spec import Deformation, Light, Scene, Shape, Texture
+from scenes.spec import NAME_ON_DISK, Deformation, Light, Scene, Shape, Texture
 from scenes.user_assets.pool import USER_SHAPES, USER_TEXTURES
 from stereoforge_kit.errors import InputError
 
@@ -51,23 +51,26 @@ def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str
     )
 
 
-def _without_defaults(converter: Converter, cls: Any) -> Callable[[Any], dict[str, Any]]:
-    """How to write a record that has fields marked `OMIT_DEFAULT`."""
-    omitted: dict[str, Any] = {
-        field.name: override(omit_if_default=True) for field in fields(cls) if field.metadata == OMIT_DEFAULT
+def _overrides(cls: Any) -> dict[str, Any]:
+    """What a record's marked fields are called on disk, and which of them are left out at their default."""
+    return {
+        field.name: override(
+            omit_if_default=field.metadata.get("omit_default"), rename=field.metadata.get(NAME_ON_DISK)
+        )
+        for field in fields(cls)
+        if field.metadata
     }
-    return make_dict_unstructure_fn(cls, converter, **omitted)
 
 
 def _make_converter() -> Converter:
     converter = Converter(forbid_extra_keys=True)
     converter.register_structure_hook_factory(
         is_dataclass,
-        lambda cls: make_dict_structure_fn(cls, converter, _cattrs_forbid_extra_keys=True),
+        lambda cls: make_dict_structure_fn(cls, converter, _cattrs_forbid_extra_keys=True, **_overrides(cls)),
     )
     converter.register_unstructure_hook_factory(
-        lambda cls: is_dataclass(cls) and any(field.metadata == OMIT_DEFAULT for field in fields(cls)),
-        lambda cls: _without_defaults(converter, cls),
+        lambda cls: is_dataclass(cls) and any(field.metadata for field in fields(cls)),
+        lambda cls: make_dict_unstructure_fn(cls, converter, **_overrides(cls)),
     )
     _tagged(converter, Shape, scenes.shapes.SHAPES | USER_SHAPES)
     _tagged(converter, Texture, scenes.textures.TEXTURES | USER_TEXTURES)

@@ -32,6 +32,9 @@ Color = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 """(w, x, y, z), unit length."""
 
+NAME_ON_DISK = "name_on_disk"
+"""Key in a field's metadata: what the field is called in files, where that is not its own name."""
+
 IDENTITY_ROTATION: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -298,7 +301,8 @@ class FinalPass:
     """Share of the light lost in the corners, 0..1."""
     exposure_difference_ev: float = 0.0
     """The right view's exposure relative to the left's, in stops."""
-    right_view_color: Color = (1.0, 1.0, 1.0)
+    # The record's text seeds the sensor's noise, so another name in files would be another final pass.
+    right_view_color: Color = field(default=(1.0, 1.0, 1.0), metadata={NAME_ON_DISK: "right_eye_color"})
     """The right view's colour balance relative to the left's: a gain for each RGB channel."""
 
 

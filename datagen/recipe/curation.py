@@ -39,7 +39,7 @@ class Curation:
     """Share that may show the back of one object; if it is more, the camera is inside the object."""
     max_one_object: float = 0.9
     """Share that one object, or the sky, may fill."""
-    max_hidden: float = 0.7
+    max_occluded: float = 0.7
     """Share that may be invisible in the right view: occluded or out of frame."""
     min_textured: float = 0.05
     """Share of the rendered picture that must have texture."""
@@ -52,7 +52,7 @@ class Curation:
     def __post_init__(self) -> None:
         if self.attempts < 1:
             raise DatasetError(f"curation attempts must be at least 1, got {self.attempts}")
-        for name in ("max_inside", "max_one_object", "max_hidden", "min_textured", "max_outside"):
+        for name in ("max_inside", "max_one_object", "max_occluded", "min_textured", "max_outside"):
             if not 0 <= getattr(self, name) <= 1:
                 raise DatasetError(f"curation {name} must be in 0..1, got {getattr(self, name):g}")
         if self.disparity_px and not 0 <= self.disparity_px[0] < self.disparity_px[1]:
@@ -99,7 +99,7 @@ def _faults(caster: SceneRayCaster, curation: Curation, frame: int) -> Iterator[
         yield "camera inside an object"
     if counts.max() > curation.max_one_object:
         yield "one surface fills the view"
-    if (hits.occlusion != VISIBLE).mean() > curation.max_hidden:
+    if (hits.occlusion != VISIBLE).mean() > curation.max_occluded:
         yield "mostly occluded or out of frame"
     if share_outside(hits.disparity[hits.object_index > 0], curation) > curation.max_outside:
         yield "disparity out of range"

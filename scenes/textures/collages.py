@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 import numpy as np
@@ -27,7 +27,7 @@ from scenes.appearance.painting import (
     unit_grid,
 )
 from scenes.random_draws import chance, choose, integer, log_uniform, new_seed, uniform
-from scenes.spec import Texture
+from scenes.spec import NAME_ON_DISK, Texture
 
 
 def overlapping_shapes(
@@ -85,7 +85,7 @@ class DeadLeaves(Texture):
     palette: Palette
     corners: int
     """0 for discs, 3 or more for polygons, -1 for a mixture."""
-    shapes: int
+    shapes: int = field(metadata={NAME_ON_DISK: "figures"})
     smallest: float
     """Radius in pixels."""
     largest: float
@@ -134,7 +134,7 @@ class BlurredShapes(Texture):
     size: int
     seed: int
     palette: Palette
-    shapes: int
+    shapes: int = field(metadata={NAME_ON_DISK: "figures"})
     blur: float
     """Standard deviation of the blur as a share of the picture."""
     grain: float

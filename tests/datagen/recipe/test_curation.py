@@ -123,7 +123,7 @@ def test_impossible_curation_is_refused() -> None:
         Curation(attempts=0)
     with pytest.raises(DatasetError, match=r"\(least, greatest\)"):
         Curation(disparity_px=(5.0, 2.0))
-    for name in ("max_inside", "max_one_object", "max_hidden", "min_textured", "max_outside"):
+    for name in ("max_inside", "max_one_object", "max_occluded", "min_textured", "max_outside"):
         for value in (-0.1, 7.0, float("nan")):
             with pytest.raises(DatasetError, match=f"{name} must be in 0..1"):
                 Curation(**{name: value})
