@@ -99,10 +99,12 @@ class ErrorPool:
 
     @property
     def bad_pixel_rate(self) -> float:
+        """Share of pixels with ground truth whose error exceeds the threshold; NaN without a pixel."""
         return self.bad / self.pixels if self.pixels else float("nan")
 
     @property
     def end_point_error(self) -> float:
+        """Mean absolute error in pixels; NaN without a pixel."""
         estimated = self.pixels - self.missing
         return self.total_error / estimated if estimated else float("nan")
 
@@ -133,6 +135,7 @@ class GradientPool:
 
     @property
     def gradient_error(self) -> float:
+        """Mean absolute error of dx plus that of dy, pixels per pixel; NaN without a pixel."""
         return float((self.totals / self.counts).sum()) if self.counts.all() else float("nan")
 
 
@@ -253,6 +256,7 @@ class D1Pool:
 
     @property
     def rates(self) -> KittiD1:
+        """The outlier rates of background, foreground and all pixels."""
         counted = np.append(self.pixels, self.pixels.sum())
         wrong = np.append(self.outliers, self.outliers.sum())
         background, foreground, everything = np.where(counted > 0, wrong / np.maximum(counted, 1), np.nan)

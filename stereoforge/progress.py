@@ -10,4 +10,5 @@ console = Console(highlight=False)
 
 
 def progress_bar() -> JobProgress:
+    """A progress display on the commands' console."""
     return JobProgress(console)

@@ -9,9 +9,13 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import re
 import tarfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from fnmatch import fnmatchcase
 from functools import lru_cache
+from glob import has_magic
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,11 +23,13 @@ import fsspec
 
 from datagen.errors import DatasetError, FormatError
 from datagen.formats.limits import MAX_FILE_BYTES
-from stereoforge_kit.files import replacing
+from stereoforge_kit.files import is_data, replacing
 
 CACHE_VARIABLE = "STEREOFORGE_CACHE"
 """The environment variable that names the cache folder."""
 _INDICES_KEPT = 4096
+_MOST_SHARDS = 1_000_000
+_BRACES = re.compile(r"\{(?:(?P<first>\d{1,9})\.\.(?P<last>\d{1,9})|(?P<list>[^{}]*,[^{}]*))\}")
 _MAX_HEADER_BYTES = 1 << 20
 
 
@@ -40,16 +46,84 @@ a dot, such as `left.png`."""
 
 
 def list_shards(location: str) -> list[str]:
-    """The sorted URLs of a folder's tar files, or the URL of the one tar file named.
+    """The sorted URLs of a folder's tar files, or those of the tar files named.
 
-    Raises DatasetError if the location cannot be listed.
+    Tar files are named as WebDataset names them: `train-000000.tar`, `train-{000000..000003}.tar`, `{a,b}.tar`,
+    `train-*.tar`. What exists as it is written, such as a folder `set[1]`, is no pattern. Raises DatasetError if
+    the location cannot be listed.
     """
     try:
-        system, path = fsspec.core.url_to_fs(location)
-        found = [path] if path.endswith(".tar") else sorted(system.glob(f"{path.rstrip('/')}/*.tar"))
-        return [system.unstrip_protocol(name) for name in found]
+        return [shard for part in _alternatives(location) for shard in _list(part)]
     except (OSError, ValueError, ImportError) as error:
+        if isinstance(error, DatasetError):
+            raise
         raise DatasetError(f"{location}: cannot be listed ({error})") from error
+
+
+def names_shards(location: str) -> bool:
+    """Whether a location names tar files, not a folder of them."""
+    return location.endswith((".tar", "}"))
+
+
+def _list(location: str) -> list[str]:
+    system, path = fsspec.core.url_to_fs(location)
+    folder, _, name = path.rpartition("/")
+    if not path.endswith(".tar"):
+        found = _children(system, path, "*.tar")
+    elif not has_magic(path) or system.exists(path):
+        found = [path]
+    elif not has_magic(folder) or system.isdir(folder):
+        found = _children(system, folder, name)
+    else:
+        found = sorted(system.glob(path))
+    return [system.unstrip_protocol(name) for name in found]
+
+
+def _children(system: fsspec.AbstractFileSystem, folder: str, pattern: str) -> list[str]:
+    """The paths of the data in a folder whose names match; the folder's name is no pattern."""
+    try:
+        paths = system.ls(folder, detail=False)
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    names = ((path.rstrip("/").rpartition("/")[2], path) for path in paths)
+    return sorted(path for name, path in names if fnmatchcase(name, pattern) and is_data(name))
+
+
+def _alternatives(location: str) -> list[str]:
+    """A location with its braces expanded, except where they are part of a name that exists."""
+    if "{" not in location or _exists(location):
+        return [location]
+    folder, slash, name = location.rpartition("/")
+    literal = f"{folder}{slash}" if "{" in folder and _exists(folder) else ""
+    alternatives = [f"{literal}{part}" for part in _expand(name if literal else location)]
+    if len(alternatives) > _MOST_SHARDS:
+        raise DatasetError(f"{location}: names more than {_MOST_SHARDS} files")
+    return alternatives
+
+
+def _exists(location: str) -> bool:
+    system, path = fsspec.core.url_to_fs(location)
+    return bool(system.exists(path))
+
+
+def _expand(text: str) -> Iterator[str]:
+    """The texts that a shell's brace expansion gives: `{00..12}` with as many digits, `{a,b}`; at most one too many.
+
+    >>> list(_expand("{a,b}-{08..10}"))
+    ['a-08', 'a-09', 'a-10', 'b-08', 'b-09', 'b-10']
+    """
+    braces = _BRACES.search(text)
+    if braces is None:
+        yield text
+        return
+    before, after = text[: braces.start()], text[braces.end() :]
+    first, last = braces["first"], braces["last"]
+    if first is None:
+        inner: Iterable[str] = braces["list"].split(",")
+    else:
+        inner = (f"{number:0{len(first)}d}" for number in range(int(first), int(last) + 1))
+    every = (f"{before}{part}{rest}" for part in inner for rest in _expand(after))
+    yield from islice(every, _MOST_SHARDS + 1)
 
 
 def read_sample_member(shard: str, key: str, member: str) -> bytes | None:
@@ -86,7 +160,7 @@ def shard_index(path: Path) -> ShardIndex:
         with _HeaderFile(path) as file, tarfile.open(fileobj=file, mode="r:") as shard:
             size = os.fstat(file.fileno()).st_size
             for entry in shard:
-                if not entry.isfile():
+                if not entry.isfile() or not is_data(entry.name):
                     continue
                 bounded = 0 <= entry.size <= min(MAX_FILE_BYTES, size - entry.offset_data)
                 if not bounded or entry.issparse():

@@ -11,7 +11,7 @@ from datagen.formats.flow import read_flow, write_flow
 from datagen.formats.gradient_exr import read_gradient, write_gradient
 from datagen.formats.normals_exr import read_normals, write_normals
 from datagen.formats.occlusion import read_occlusion, write_occlusion
-from datagen.formats.pfm import read_pfm, write_pfm
+from datagen.formats.pfm import read_pfm, read_pfm_disparity, write_pfm
 from datagen.formats.pgm import read_mask, write_mask
 from datagen.formats.png import read_png, write_png
 
@@ -23,6 +23,7 @@ __all__ = [
     "read_normals",
     "read_occlusion",
     "read_pfm",
+    "read_pfm_disparity",
     "read_png",
     "write_camera_data",
     "write_flow",

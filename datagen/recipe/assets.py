@@ -23,9 +23,11 @@ from numpy.typing import NDArray
 from datagen.errors import DatasetError
 from datagen.executors import LocalExecutor, WorkerPolicy
 from datagen.formats.limits import check_image_size
+from datagen.formats.picture import read_picture
 from scenes.geometry.building import solid
 from scenes.user_assets.pool import Asset, AssetPool
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.files import walk_files
 from stereoforge_kit.processes import Limits
 
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
@@ -92,9 +94,12 @@ def _import_folder(
 ) -> tuple[Asset, ...]:
     if not folder.is_dir():
         raise DatasetError(f"{folder}: there is no such folder")
-    paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in suffixes and path.is_file())
+    paths = [path for path in walk_files(folder) if path.suffix.lower() in suffixes]
     originals: dict[str, Path] = {}
     for path in paths:
+        if not path.is_file():
+            skipped.append(f"{path}: is no file, or a link to none")
+            continue
         if path.stat().st_size > MAX_FILE_BYTES:
             skipped.append(f"{path}: is larger than {MAX_FILE_BYTES >> 20} MB")
             continue
@@ -164,14 +169,11 @@ def prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
 
 
 def prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
-    """A texture's `image`, (H, W, 3) uint8 sRGB.
+    """A texture's `image`, (H, W, 3) uint8 sRGB, as `datagen.formats.picture` reads it.
 
-    Raises ValueError for a file of no use, and whatever the parser raises.
+    Raises FormatError for a file of no use.
     """
-    image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR)
-    if image is None:
-        raise InputError("its pixels do not decode")
-    return {"image": cv2.cvtColor(_bounded(image), cv2.COLOR_BGR2RGB)}
+    return {"image": _bounded(read_picture(path))}
 
 
 def prepare_environment(path: Path) -> dict[str, NDArray[np.generic]]:

@@ -25,7 +25,7 @@ from datagen.rendering.quarantine import (
 )
 from datagen.rendering.run_log import RunLog, run_log
 from datagen.rendering.scene_job import SceneJob, render_scene
-from datagen.rendering.staging import STAGING_FOLDER, StagingArea, discard_uncommitted, staging_area
+from datagen.rendering.staging import StagingArea, discard_uncommitted, staging_area
 from stereoforge_kit.files import LocalTree, Tree, open_tree
 from stereoforge_kit.processes import Limits, available_memory_bytes
 
@@ -247,7 +247,7 @@ def _merge(tree: Tree, recipe: Recipe) -> Recipe:
     if tree.exists(name):
         existing = recipe_from_text(tree.read(name), f"{tree.name}/{name}")
         return merge_into(existing, recipe, tree.name)
-    if set(tree.files_in("")) - {STAGING_FOLDER}:
+    if tree.files_in(""):
         raise DatasetError(f"{tree.name} is neither empty nor a data set; give a new or empty folder")
     return recipe
 

@@ -19,6 +19,7 @@ from datagen.formats import read_png
 from datagen.formats.picture import read_picture
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+from stereoforge_kit.files import matching, walk_files
 
 UNITS_PER_PX = 32
 """Of the 16-bit PNG files."""
@@ -34,7 +35,7 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
 
 
 def _recognises(root: Path) -> bool:
-    return any(True for pattern in ("", "*/") for _ in root.glob(f"{pattern}*{_LEFT}"))
+    return bool(matching(root, (f"*{_LEFT}", f"*/*{_LEFT}")))
 
 
 def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
@@ -42,7 +43,9 @@ def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
 
 
 def _frames(root: Path) -> Iterator[FileFrame]:
-    for truth in sorted(root.rglob(f"*{_LEFT}")):
+    for truth in walk_files(root):
+        if not truth.name.endswith(_LEFT):
+            continue
         stem = truth.name.removesuffix(_LEFT)
         name = (truth.parent / stem).relative_to(root).as_posix()
         yield FileFrame(

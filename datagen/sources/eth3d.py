@@ -14,6 +14,7 @@ from pathlib import Path
 from datagen.sources.middlebury import ETH3D_IMAGES, scene_frame
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+from stereoforge_kit.files import matching
 
 _PAIR = re.compile(r"_\d+[ls]$")
 
@@ -28,7 +29,7 @@ def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
 
 def _frames(root: Path) -> Iterator[FileFrame]:
     truths = root / f"{ETH3D_IMAGES}_gt"
-    for image in sorted((root / ETH3D_IMAGES).glob("*/im0.png")):
+    for image in matching(root / ETH3D_IMAGES, "*/im0.png"):
         scene = image.parent
         beside = truths / scene.name
         place = _PAIR.sub("", scene.name)

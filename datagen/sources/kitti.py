@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats import read_png
+from datagen.formats.impossible_disparity import drop_impossible
 from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.picture import read_picture
 from datagen.ground_truth.from_disparity import occlusion_from_mask
 from datagen.sources.registry import DataSource, SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+from stereoforge_kit.files import matching
 
 UNITS_PER_PX = 256
 """Of the 16-bit PNG files; 0 stands for no disparity."""
@@ -73,7 +75,7 @@ def read_labels(all_points: Path, visible_points: Path) -> NDArray[np.uint8]:
 
     Raises FormatError.
     """
-    disparity = read_disparity(all_points)
+    disparity, _ = drop_impossible(read_disparity(all_points))
     not_visible = np.isnan(read_disparity(visible_points)) & ~np.isnan(disparity)
     return occlusion_from_mask(disparity, not_visible)
 
@@ -112,7 +114,7 @@ def _scenes(frame_list: Path) -> dict[str, str]:
 
 def _frames(folder: Path, edition: _Edition) -> Iterator[FileFrame]:
     scenes = _scenes(folder / FRAME_LIST)
-    for truth in sorted((folder / edition.all_points).glob(_REFERENCE_FRAMES)):
+    for truth in matching(folder / edition.all_points, _REFERENCE_FRAMES):
         visible = folder / edition.visible_points / truth.name
         objects = None if edition.objects is None else folder / edition.objects / truth.name
         yield FileFrame(
@@ -133,8 +135,8 @@ def testing_frames(source: DataSource) -> Sequence[StereoFrame]:
     """
     folder = Path(source.location) / "testing"
     for edition in _EDITIONS[source.format.name]:
-        if (folder / edition.left).is_dir():
-            images = sorted((folder / edition.left).glob(_REFERENCE_FRAMES))
+        images = matching(folder / edition.left, _REFERENCE_FRAMES)
+        if images:
             return FileFrames(_testing_frame(left, folder / edition.right / left.name) for left in images)
     return []
 

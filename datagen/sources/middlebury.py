@@ -17,18 +17,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats import read_pfm, read_png
+from datagen.formats import read_pfm_disparity, read_png
+from datagen.formats.impossible_disparity import drop_impossible
 from datagen.formats.picture import read_picture
 from datagen.ground_truth.from_disparity import occlusion_from_mask
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+from stereoforge_kit.files import matching
 
 ETH3D_IMAGES = "two_view_training"
 """ETH3D's folder of images: its scenes are encoded as these are (`datagen.sources.eth3d`)."""
 _SHOWN_BY_BOTH = 255
 _VARIANT = re.compile(r"(?<=[a-z])\d?[ELP]?(-(im)?perfect)?$")
 """What tells pictures of one scene apart: the direction of view, the exposure, the light, the rectification."""
-_DISPARITY_NAMES = ("disp{}GT.pfm", "disp{}.pfm")
+_DISPARITY_NAMES = ("disp{}GT.pfm", "disp{}.pfm", "disp{}GT.PFM", "disp{}.PFM")
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
@@ -36,14 +38,14 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
 
     Raises FormatError for a file that is none.
     """
-    disparity = read_pfm(path)
+    disparity = read_pfm_disparity(path)
     disparity[np.isinf(disparity)] = np.nan
     return disparity
 
 
 def read_labels(disparity_left: Path, mask: Path) -> NDArray[np.uint8]:
     """Occlusion labels (H, W) of the left view from its disparity and `mask0nocc.png`. Raises FormatError."""
-    disparity = read_disparity(disparity_left)
+    disparity, _ = drop_impossible(read_disparity(disparity_left))
     shown = read_png(mask)
     not_visible = ((shown if shown.ndim == 2 else shown[..., 0]) != _SHOWN_BY_BOTH) & ~np.isnan(disparity)
     return occlusion_from_mask(disparity, not_visible)
@@ -79,15 +81,14 @@ def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
 
 
 def _frames(root: Path) -> Iterator[FileFrame]:
-    for pattern in ("im0.png", "*/im0.png", "*/*/im0.png"):
-        for image in sorted(root.glob(pattern)):
-            name = image.parent.relative_to(root).as_posix()
-            scene_name = _VARIANT.sub("", image.parent.name)
-            frame = scene_frame(
-                image.parent.name if name == "." else name, scene_name, image.parent, image.parent
-            )
-            if frame is not None:
-                yield frame
+    for image in matching(root, ("im0.png", "*/im0.png", "*/*/im0.png")):
+        name = image.parent.relative_to(root).as_posix()
+        scene_name = _VARIANT.sub("", image.parent.name)
+        frame = scene_frame(
+            image.parent.name if name == "." else name, scene_name, image.parent, image.parent
+        )
+        if frame is not None:
+            yield frame
 
 
 FORMATS = (SourceFormat("middlebury", "Middlebury", _recognises, _find),)

@@ -19,6 +19,7 @@ from datagen.errors import FormatError
 from datagen.formats.picture import read_picture, read_raster
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+from stereoforge_kit.files import matching
 
 _SCALES = ((450, 4), (900, 2), (1800, 1))
 """(largest image width, grey values per pixel of disparity)."""
@@ -49,7 +50,7 @@ def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
 
 
 def _frames(root: Path) -> Iterator[FileFrame]:
-    for scene in (root, *sorted(path for path in root.glob("*") if path.is_dir())):
+    for scene in (root, *filter(Path.is_dir, matching(root, "*"))):
         files = [_either(scene, name) for name in ("im2", "im6", "disp2", "disp6")]
         left, right, truth_left, truth_right = files
         if left and right and truth_left:

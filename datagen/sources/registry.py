@@ -7,8 +7,9 @@ structure decides. A new format is one module in `datagen.sources` with a tuple 
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,9 @@ from datagen.errors import DatasetError
 from datagen.sources.stereo_frame import StereoFrame
 
 _SELECTION = re.compile(r"(.+)#(\d{1,9})-(\d{1,9})")
+_FORMAT_NAME = re.compile(r"[A-Za-z][\w-]+")
+"""Of two letters and more: one alone is a drive."""
+_PATTERN = re.compile(r"[*?\[{]")
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,8 @@ class SourceFormat:
     """From (location, split) to the frames with ground truth, in order. A format without splits ignores the split."""
     splits: tuple[str, ...] = ()
     """The splits that the format has; empty if all its frames belong to every split."""
+    takes_patterns: bool = False
+    """Whether a location may be a pattern of files' names, which need not exist as it is written."""
 
 
 @dataclass(frozen=True)
@@ -89,21 +95,46 @@ def open_source(text: str | Path) -> DataSource:
         location, selection = match[1], (int(match[2]), int(match[3]))
     prefix, colon, rest = location.partition(":")
     formats = source_formats()
-    if colon and prefix in formats and not Path(location).exists():
-        return DataSource(formats[prefix], rest, selection)
+    if colon and not Path(location).exists():
+        if prefix in formats:
+            return DataSource(formats[prefix], _existing(rest, formats[prefix].takes_patterns), selection)
+        if _FORMAT_NAME.fullmatch(prefix) and not rest.startswith("//"):
+            raise DatasetError(f"{location}: there is no format {prefix}; there are {_listed(formats)}")
     if "://" in location:
         raise DatasetError(f"{location}: say what is there, for example webdataset:{location}")
+    location = _existing(location)
     folder = Path(location)
-    if not folder.exists():
-        raise DatasetError(f"{folder}: there is no such folder")
     found = [kind for kind in formats.values() if kind.recognises(folder)]
     if len(found) != 1:
         what = " and ".join(kind.title for kind in found) or "no data set of a known layout"
         raise DatasetError(
             f"{folder}: looks like {what}; name the format in front, such as {next(iter(formats))}:{folder} "
-            f"(there are {', '.join(formats)})"
+            f"(there are {_listed(formats)})"
         )
     return DataSource(found[0], location, selection)
+
+
+def _existing(location: str, pattern_allowed: bool = False) -> str:
+    """A folder, file or URL with `~` replaced by the home folder, which a shell does not do after a prefix.
+
+    Raises DatasetError for one on this machine that is missing.
+    """
+    if "://" in location:
+        return location
+    found = location if Path(location).exists() else with_home(location)
+    if not Path(found).exists() and not (pattern_allowed and _PATTERN.search(location)):
+        raise DatasetError(f"{found}: there is no such {'file' if found.endswith('.tar') else 'folder'}")
+    return found
+
+
+def with_home(location: str) -> str:
+    """A location with `~` replaced by the home folder; that of a user who is not there stays as it is."""
+    return os.path.expanduser(location)  # noqa: PTH111 (Path.expanduser raises for such a user.)
+
+
+def _listed(formats: Iterable[str]) -> str:
+    """The names of formats in a sentence, without those of final passes."""
+    return ", ".join(name for name in formats if not name.endswith("-final"))
 
 
 def source_formats() -> dict[str, SourceFormat]:

@@ -2,9 +2,9 @@
 `frames_finalpass` beside `disparity`.
 
 The disparities of both views are PFM files in pixels. Most files are positive. Some are negative throughout (right
-views of Driving, the subset for DispNet and FlowNet 2.0), so a file whose median is negative is negated. A value that
-is still negative then, or larger than the image is wide, is an error of the set (FlyingThings3D has such frames) and
-becomes NaN. Occlusion is derived from both disparities.
+views of Driving, the subset for DispNet and FlowNet 2.0), so a file whose median is negative is negated. Values that
+are still negative then, or larger than the image is wide, are errors of the set (FlyingThings3D has such frames), and
+missing as in every set. Occlusion is derived from both disparities.
 
 A scene of FlyingThings3D is a folder of frames. Driving is one street, seen with two lenses, in two directions and at
 two speeds. Monkaa's folders show eight worlds, most of them more than once: `eating_x2` and `eating_camera2_x2`.
@@ -20,10 +20,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats import read_pfm
+from datagen.formats import read_pfm_disparity
 from datagen.formats.picture import read_picture
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+from stereoforge_kit.files import matching
 
 PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
 PARTS = {"train": "TRAIN", "test": "TEST"}
@@ -33,16 +34,10 @@ _VARIANT = re.compile(r"(_(camera2|naked|augmented\d|difftex\d?|winter))*_x2$")
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a SceneFlow disparity: (H, W) float32 px, positive, NaN where invalid.
-
-    Raises FormatError for a file that is none.
-    """
-    disparity = read_pfm(path)
-    if np.nanmedian(disparity) < 0:
-        disparity = -disparity
-    impossible = ~((disparity >= 0) & (disparity <= disparity.shape[1]))
-    disparity[impossible] = np.nan
-    return disparity
+    """Read a SceneFlow disparity: (H, W) float32 px, positive. Raises FormatError for a file that is none."""
+    disparity = read_pfm_disparity(path)
+    known = disparity[np.isfinite(disparity)]
+    return -disparity if known.size and np.median(known) < 0 else disparity
 
 
 def _flying_things(root: Path, images: str) -> bool:
@@ -52,11 +47,11 @@ def _flying_things(root: Path, images: str) -> bool:
 
 
 def _driving(root: Path, images: str) -> bool:
-    return any(True for _ in root.glob(f"{images}/*mm_focallength/*/*/left"))
+    return bool(matching(root, f"{images}/*mm_focallength/*/*/left"))
 
 
 def _monkaa(root: Path, images: str) -> bool:
-    return any(True for _ in root.glob(f"{images}/*/left"))
+    return bool(matching(root, f"{images}/*/left"))
 
 
 def _recognises(root: Path, render_pass: str, has_images: Callable[[Path, str], bool]) -> bool:
@@ -74,7 +69,7 @@ def _find(
 
 
 def _frames(images: Path, truths: Path, pattern: str, scene_of: Callable[[str], str]) -> Iterator[FileFrame]:
-    for truth in sorted(truths.glob(f"{pattern}/left/*.pfm")):
+    for truth in matching(truths, f"{pattern}/left/*.[pP][fF][mM]"):
         scene = truth.parent.parent.relative_to(truths)
         yield FileFrame(
             name=f"{scene.as_posix()}/{truth.stem}",

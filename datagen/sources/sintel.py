@@ -20,6 +20,7 @@ from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.formats.picture import read_picture
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
+from stereoforge_kit.files import matching
 
 PASSES = ("clean", "final")
 _UNITS = np.array([4, 1 / 64, 1 / 16384], np.float32)
@@ -60,7 +61,7 @@ def _find(root: str, split: str, render_pass: str) -> Sequence[StereoFrame]:  # 
 
 
 def _frames(folder: Path, render_pass: str) -> Iterator[FileFrame]:
-    for truth in sorted((folder / "disparities").glob("*/*.png")):
+    for truth in matching(folder / "disparities", "*/*.png"):
         path = truth.relative_to(folder / "disparities")
         yield FileFrame(
             name=path.with_suffix("").as_posix(),

@@ -1,6 +1,7 @@
 """WebDataset shards as `stereoforge export` writes them (docs/conventions.md).
 
-The shards are `<split>-%06d.tar`, local or at any URL that fsspec opens. Their samples `<split>-<scene>-<frame>` have
+The shards are `<split>-%06d.tar`, local or at any URL that fsspec opens: a folder of them, or as WebDataset names
+them, `set/train-{000000..000003}.tar` or `set/train-*.tar`. Their samples `<split>-<scene>-<frame>` have
 members that are encoded as the files of the native tree. Gradients are derived from the disparity, which gives the same
 numbers as the native tree has. Everything else is read.
 """
@@ -24,14 +25,15 @@ from numpy.typing import NDArray
 
 from datagen.dataset.layout import SPLITS
 from datagen.dataset.manifest import OWN_DIGEST, FileEntry, check_seal, file_entries
-from datagen.dataset.shards import list_shards, local_copy, read_sample_member, shard_index
+from datagen.dataset.shards import list_shards, local_copy, names_shards, read_sample_member, shard_index
 from datagen.errors import DatasetError, FormatError
 from datagen.formats.occlusion import labels_of
-from datagen.formats.pfm import decode_pfm
+from datagen.formats.pfm import decode_pfm, first_channel
 from datagen.formats.png import decode_png
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.files import matching
 
 INDEX_NAME = "index.json"
 """The file that lists the shards of a folder, their samples and their SHA-256."""
@@ -85,7 +87,7 @@ class ShardFrames(Sequence[StereoFrame]):
 
 
 def _recognises(root: Path) -> bool:
-    names = [root.name] if root.is_file() else (path.name for path in root.glob("*.tar"))
+    names = [root.name] if root.is_file() else (path.name for path in matching(root, "*.tar"))
     return any(_SHARD_NAME.fullmatch(name) for name in names)
 
 
@@ -94,8 +96,12 @@ def _find(location: str, split: str) -> Sequence[StereoFrame]:
     names = None if index is None else index.shards
     shards = list_shards(location) if names is None else [f"{location.rstrip('/')}/{name}" for name in names]
     samples: list[tuple[str, str]] = []
-    for shard in sorted(shards):
+    for shard in sorted(set(shards)):
         name = _SHARD_NAME.fullmatch(shard.rpartition("/")[2])
+        if name is None and names_shards(location):
+            raise DatasetError(
+                f"{shard}: is not named after its split and number as in train-000000.tar (train, val or test)"
+            )
         if name and name[1] == split:
             keys = shard_index(local_copy(shard)) if names is None else names[name[0]]
             samples += ((shard, key) for key in keys)
@@ -114,7 +120,7 @@ class ShardSetIndex:
 
 def read_index(location: str) -> ShardSetIndex | None:
     """The index of a folder of shards, None if there is none. Raises DatasetError for an index that is damaged."""
-    if location.endswith(".tar"):
+    if names_shards(location):
         return None
     url = f"{location.rstrip('/')}/{INDEX_NAME}"
     try:
@@ -158,8 +164,8 @@ def _frame(shard: str, key: str) -> FileFrame:
         scene_name=scene_of(key),
         read_left=partial(read, "left.png", decode_png),
         read_right=partial(read, "right.png", decode_png),
-        read_disparity_left=partial(read, "disparity_left.pfm", decode_pfm),
-        read_disparity_right=partial(read, "disparity_right.pfm", decode_pfm),
+        read_disparity_left=partial(read, "disparity_left.pfm", _decode_disparity),
+        read_disparity_right=partial(read, "disparity_right.pfm", _decode_disparity),
         read_occlusion_left=partial(read, "occlusion_left.png", _decode_occlusion),
         read_object_index_left=partial(read, "object_index_left.png", decode_png),
     )
@@ -167,6 +173,10 @@ def _frame(shard: str, key: str) -> FileFrame:
 
 def _decode_occlusion(data: bytes, origin: str) -> NDArray[np.uint8]:
     return labels_of(decode_png(data, origin), origin)
+
+
+def _decode_disparity(data: bytes, origin: str) -> NDArray[np.float32]:
+    return first_channel(decode_pfm(data, origin), origin)
 
 
 def _read(shard: str, key: str, member: str, decode: Any) -> Any:
@@ -205,4 +215,4 @@ def _description(shard: str, key: str) -> dict[str, Any]:
     return description
 
 
-FORMATS = (SourceFormat("webdataset", "WebDataset shards", _recognises, _find, SPLITS),)
+FORMATS = (SourceFormat("webdataset", "WebDataset shards", _recognises, _find, SPLITS, takes_patterns=True),)

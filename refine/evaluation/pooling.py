@@ -92,6 +92,7 @@ class MethodPool:
 
     @classmethod
     def empty(cls, bad_threshold: float, gradient_threshold: float) -> MethodPool:
+        """A pool without a pixel."""
         regions = {name: ErrorPool(bad_threshold) for name in REGIONS}
         return cls(gradient_threshold, regions, GradientPool(), GradientPool(), D1Pool())
 

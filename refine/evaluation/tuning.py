@@ -66,10 +66,12 @@ class TunedMethod:
 
     @property
     def objective(self) -> float:
+        """The least objective found."""
         return min(trial.objective for trial in self.trials)
 
     @property
     def default_objective(self) -> float:
+        """The objective of the default parameters."""
         return self.trials[0].objective
 
 

@@ -70,6 +70,7 @@ class PaperTable:
 
     @property
     def has_paper(self) -> bool:
+        """Whether any of its rows has a number printed in the paper."""
         return any(not math.isnan(cell.paper) for row in self.rows for cell in row.cells)
 
 

@@ -58,6 +58,7 @@ def number(value: float, digits: int = 2, scale: float = 1.0, best: bool = False
 
 
 def percent(value: float, best: bool = False) -> Cell:
+    """A cell with a share in per cent."""
     return number(value, digits=2, scale=100, best=best)
 
 

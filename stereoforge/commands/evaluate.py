@@ -47,8 +47,8 @@ class Evaluate:
     """Sample each frame's posterior N times (32 is enough), and report how well its standard deviations tell wrong
     refined disparities from right ones; 0 leaves it out. Each sample takes as long as a refinement."""
     submission: Annotated[Path | None, shown("DIR", "none")] = None
-    """Also write the refined disparities of KITTI sets as its server takes them: DIR/disp_0/NNNNNN_10.png, those of
-    the set's testing part if it is there."""
+    """Also write the refined disparities of a KITTI set as its server takes them, DIR/disp_0/NNNNNN_10.png for 2015 and
+    DIR/NNNNNN_10.png for 2012: those of its testing part, or of the training part where only that is there or named."""
     device: Annotated[str, shown("NAME")] = "cpu"
     """What the networks run on: cpu, cuda, ..."""
 
@@ -77,10 +77,10 @@ class Evaluate:
             open_test_data,
             report_evaluation,
         )
-        from stereoforge.pipelines.submission import find_submission_frames, write_submission
+        from stereoforge.pipelines.submission import find_submission, write_submission
 
         data = open_test_data(self.data, self.split)
-        to_submit = find_submission_frames(self.data) if self.submission else []
+        submission = find_submission(self.data) if self.submission else None
         settings = open_settings(self.parameters, self.weights, self.predictor)
         predictors = open_predictors(self.weights, self.device, self.predictor)
         rows = settings.rows(methods)
@@ -109,6 +109,8 @@ class Evaluate:
             console.print(note, markup=False, soft_wrap=True)
         frames = ", ".join(f"{len(each.evaluation.frames)} of {each.name}" for each in sets)
         console.print(f"{files.html}: frames evaluated: {frames}", markup=False)
-        if self.submission:
-            count = write_submission(to_submit, predictors, settings.ours, self.submission)
+        if self.submission and submission:
+            count = write_submission(submission, predictors, settings.ours, self.submission)
             console.print(f"{self.submission}: {count} disparities", markup=False)
+            if submission.note:
+                console.print(submission.note, markup=False, soft_wrap=True)

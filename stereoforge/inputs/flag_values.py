@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from datagen.recipe.disparity_histogram import DisparityHistogram
 
 
+_HOST = re.compile(r"://(?:[^/@]*@)?(?:\[[^]/]*\]|[^/:]*)$")
+"""The end of a URL without a path and without a port."""
+
+
 def shown(metavar: str, default: object = None, text: str | None = None) -> Any:
     """How a flag looks in --help: its value's name, the default where the field's own says nothing, and what it does
     where a docstring cannot say it."""
@@ -76,9 +80,15 @@ def parse_shard(text: str) -> tuple[int, int]:
 
 def parse_weighted_source(text: str) -> tuple[str, float]:
     """(source, weight) of "source" (weight 1) or "source:2.5"; a folder that has such a name wins."""
+    from datagen.sources.registry import source_formats, with_home
+
     source, _, number = text.rpartition(":")
-    # The port of http://host:8080 is no weight.
-    if Path(text).exists() or not source or re.fullmatch(r"\w+://[^/]*", source):
+    prefix, _, location = text.partition(":")
+    has_format = prefix in source_formats()
+    # Neither the only word after a format nor the port of http://host:8080 is a weight.
+    if not source or (has_format and source == prefix) or _HOST.search(source):
+        return text, 1.0
+    if any(Path(with_home(name)).exists() for name in (text, location if has_format else text)):
         return text, 1.0
     try:
         weight = float(number)

@@ -31,6 +31,7 @@ class Gap:
 
     @property
     def size(self) -> float:
+        """How much larger the error is than that of the domain's own regressor."""
         return self.cross - self.home
 
     def share(self, error: float) -> float:

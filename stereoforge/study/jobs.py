@@ -35,10 +35,12 @@ class Job:
 
     @property
     def key(self) -> str:
+        """The digest of everything that decides the result."""
         return self.folder.name[-KEY_LENGTH:]
 
     @property
     def finished(self) -> bool:
+        """Whether the result is there, whole."""
         return (self.folder / FINISHED).is_file()
 
 

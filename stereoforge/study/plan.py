@@ -113,6 +113,7 @@ class StudyPlan:
 
     @property
     def subject(self) -> str:
+        """The domain whose networks are tested on all others: the first to train on."""
         return self.train[0]
 
     def recipe(self, name: str, splits: tuple[str, ...]) -> Recipe:

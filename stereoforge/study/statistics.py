@@ -74,8 +74,10 @@ def describe(frames: Sequence[StereoFrame]) -> DomainStatistics:
 
 
 def write_statistics(path: Path, statistics: DomainStatistics) -> None:
+    """Write statistics as JSON, in one step."""
     write_text(path, json.dumps(asdict(statistics), indent=1) + "\n")
 
 
 def read_statistics(path: Path) -> DomainStatistics:
+    """Read what `write_statistics` wrote."""
     return cattrs.structure(json.loads(path.read_text(encoding="utf-8")), DomainStatistics)

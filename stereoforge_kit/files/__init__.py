@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, in a folder or below a URL; temporary folders; locks."""
+"""Files that are written whole or not at all, in a folder or below a URL; temporary folders; locks; walking."""
 
 from stereoforge_kit.files.atomic import TEMPORARY_SUFFIX, replacing, write_bytes, write_text
 from stereoforge_kit.files.locks import alone, locked
@@ -9,6 +9,7 @@ from stereoforge_kit.files.temporary import (
     temporary_folder,
 )
 from stereoforge_kit.files.tree import LocalTree, RemoteTree, Tree, open_tree
+from stereoforge_kit.files.walk import is_data, matching, walk_files
 
 __all__ = [
     "TEMPORARY_SUFFIX",
@@ -17,12 +18,15 @@ __all__ = [
     "TemporaryFolders",
     "Tree",
     "alone",
+    "is_data",
     "locked",
+    "matching",
     "open_tree",
     "remove_folder",
     "replacing",
     "temporary_files_in",
     "temporary_folder",
+    "walk_files",
     "write_bytes",
     "write_text",
 ]

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files.atomic import replacing, write_bytes
 from stereoforge_kit.files.temporary import temporary_folder
+from stereoforge_kit.files.walk import is_data, walk_files
 
 
 class Tree(Protocol):
@@ -40,7 +41,10 @@ class Tree(Protocol):
         ...
 
     def files_in(self, folder: str) -> list[str]:
-        """The names, without the folder's, of the files and folders directly in a folder; none if there is none."""
+        """The names, without the folder's, of the files and folders directly in a folder; none if there is none.
+
+        Hidden files and those that desktops leave are not listed, here and in `files_below`.
+        """
         ...
 
     def adopt(self, source: Path, name: str) -> None:
@@ -88,12 +92,12 @@ class LocalTree:
 
     def files_in(self, folder: str) -> list[str]:
         try:
-            return sorted(path.name for path in (self.root / folder).iterdir())
+            return sorted(path.name for path in (self.root / folder).iterdir() if is_data(path.name))
         except (FileNotFoundError, NotADirectoryError):
             return []
 
     def files_below(self, folder: str) -> list[str]:
-        found = (path for path in (self.root / folder).rglob("*") if not path.is_dir())
+        found = walk_files(self.root / folder)
         return sorted(path.relative_to(self.root).as_posix() for path in found)
 
     def writing(self, name: str) -> AbstractContextManager[Path]:
@@ -157,11 +161,13 @@ class RemoteTree:
             found = self._place[0].ls(self._path(folder), detail=False)
         except FileNotFoundError:
             return []
-        return sorted(name for path in found if (name := path.rstrip("/").rpartition("/")[2]))
+        names = (path.rstrip("/").rpartition("/")[2] for path in found)
+        return sorted(name for name in names if name and is_data(name))
 
     def files_below(self, folder: str) -> list[str]:
         filesystem, root = self._place
-        return sorted(path.removeprefix(f"{root}/") for path in filesystem.find(self._path(folder)))
+        names = (path.removeprefix(f"{root}/") for path in filesystem.find(self._path(folder)))
+        return sorted(filter(is_data, names))
 
     @contextmanager
     def writing(self, name: str) -> Iterator[Path]:
@@ -210,4 +216,4 @@ def _files_below(source: Path) -> Iterator[Path]:
     if source.is_file():
         yield source
     else:
-        yield from sorted(path for path in source.rglob("*") if path.is_file())
+        yield from walk_files(source)

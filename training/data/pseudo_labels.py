@@ -12,16 +12,14 @@ from functools import partial
 from pathlib import Path
 from typing import overload
 
-import numpy as np
-from numpy.typing import NDArray
-
-from datagen.formats import read_pfm
+from datagen.formats import read_pfm_disparity
+from datagen.formats.impossible_disparity import PREDICTION_NOISE_PX
 from datagen.sources.kitti import read_disparity as read_kitti_disparity
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
 from training.data.pipeline import Source
 from training.errors import TrainingError
 
-_READERS = {".pfm": read_pfm, ".png": read_kitti_disparity}
+_READERS = {".pfm": read_pfm_disparity, ".png": read_kitti_disparity}
 
 
 def with_pseudo_labels(sources: Sequence[Source], folder: Path) -> Source:
@@ -39,8 +37,8 @@ class PseudoLabelFrames(Sequence[StereoFrame]):
     """The frames of a data set, with the disparities of a folder as ground truth of their left views.
 
     A frame `a/b` takes `a/b.pfm` of the folder (in pixels; infinity or NaN where unknown) or `a/b.png` (as KITTI has
-    it: 16 bits, 256 times the disparity, 0 where unknown). The right view then has no ground truth, and occlusion is
-    unknown.
+    it: 16 bits, 256 times the disparity, 0 where unknown). Disparities that cannot be become NaN. The right view then
+    has no ground truth, and occlusion is unknown.
     """
 
     def __init__(self, frames: Sequence[StereoFrame], folder: Path) -> None:
@@ -70,21 +68,16 @@ class PseudoLabelFrames(Sequence[StereoFrame]):
             scene_name=frame.scene_name,
             read_left=partial(getattr, frame, "left"),
             read_right=partial(getattr, frame, "right"),
-            read_disparity_left=partial(_read, self._files[index]),
+            read_disparity_left=partial(_READERS[self._files[index].suffix.lower()], self._files[index]),
+            disparity_noise_px=PREDICTION_NOISE_PX,
         )
 
 
 def _file_of(folder: Path, name: str) -> Path:
-    for suffix in _READERS:
+    for suffix in (*_READERS, *map(str.upper, _READERS)):
         path = folder / f"{name}{suffix}"
         if path.is_file():
             return path
     raise TrainingError(
         f"{folder}: has no disparity for the frame {name} (neither {name}.pfm nor {name}.png)"
     )
-
-
-def _read(path: Path) -> NDArray[np.float32]:
-    disparity = _READERS[path.suffix](path)
-    disparity[~np.isfinite(disparity)] = np.nan
-    return disparity

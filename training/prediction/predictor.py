@@ -15,7 +15,14 @@ from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.networks.cost_features import CostFeatures
 from training.networks.inference import estimate
 from training.networks.regressor_free import RegressorFreeInputs, regressor_free_inputs
-from training.runs.weights import has_weights, load_confnet, load_gradnet, load_regressor, on_regressor
+from training.runs.weights import (
+    has_weights,
+    load_confnet,
+    load_gradnet,
+    load_regressor,
+    on_regressor,
+    require_run_folder,
+)
 
 
 @dataclass(frozen=True)
@@ -115,8 +122,7 @@ class RegressorFreePredictor:
             TrainingError: no such folder, or damaged files.
         """
         run = Path(run)
-        if not run.is_dir():
-            raise TrainingError(f"{run}: there is no such run folder")
+        require_run_folder(run)
         self._device = torch.device(device)
         self._confnet: ConfNet | None = None
         self._gradnet: GradNet | None = None

@@ -154,10 +154,17 @@ def has_weights(run: Path, task: str) -> bool:
     return weights_path(run, task).exists()
 
 
-def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -> StoredNetwork[Network]:
-    path, description_path = weights_path(run, task), run / f"{task}.json"
+def require_run_folder(run: Path) -> None:
+    """Raise TrainingError for a run folder that is missing, or is a file."""
+    if run.is_file():
+        raise TrainingError(f"{run}: is a file, not a run folder; give the folder it is in, {run.parent}")
     if not run.is_dir():
         raise TrainingError(f"{run}: there is no such run folder")
+
+
+def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -> StoredNetwork[Network]:
+    path, description_path = weights_path(run, task), run / f"{task}.json"
+    require_run_folder(run)
     for needed in (path, description_path):
         if not needed.is_file():
             raise TrainingError(f"{needed}: missing, so {run} holds no trained {task}")

@@ -35,6 +35,7 @@ class LampDesign:
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
+        """Draw a design."""
         kind = choose(rng, ["arm", "double", "globe"], [0.6, 0.15, 0.25])
         height = uniform(rng, 3.2, 4.2) if kind == "globe" else uniform(rng, 5.5, 9.0)
         return cls(kind, height, uniform(rng, 0.9, 2.2) if kind != "globe" else 0.0)

@@ -40,6 +40,7 @@ class PersonDesign:
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
+        """Draw a design."""
         child = chance(rng, 0.15)
         return cls(
             height=uniform(rng, 1.05, 1.45) if child else uniform(rng, 1.55, 1.92),

@@ -35,6 +35,7 @@ class TreeDesign:
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
+        """Draw a design."""
         form = choose(rng, ["round", "tall", "cone", "bare"], [0.5, 0.22, 0.18, 0.1])
         height = uniform(rng, 4.5, 11.0)
         slim = {"round": (0.55, 0.8), "tall": (0.25, 0.4), "cone": (0.35, 0.5), "bare": (0.5, 0.7)}[form]

@@ -35,6 +35,7 @@ class VanDesign:
 
     @classmethod
     def sample(cls, rng: np.random.Generator, kind: str) -> Self:
+        """Draw a design."""
         if kind == "van":
             length, height = uniform(rng, 4.6, 5.9), uniform(rng, 1.95, 2.6)
             nose, radius = uniform(rng, 0.5, 0.85), 0.34

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 from PIL import Image
 
 from datagen.errors import FormatError
-from datagen.formats import read_pfm, write_pfm
+from datagen.formats import read_pfm, read_pfm_disparity, write_pfm
 
 one_folder = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 sides = st.integers(1, 12)
@@ -67,6 +67,40 @@ def test_either_byte_order_any_white_space_and_the_scale_is_not_applied(
     path = tmp_path / "a.pfm"
     path.write_bytes(header.format(scale).encode() + array[::-1].astype(f"{order}f4").tobytes())
     assert same_bits(read_pfm(path), array)
+
+
+@pytest.mark.parametrize("end", [b"", b"\n", b"\r\n"])
+@pytest.mark.parametrize(
+    "header",
+    [
+        b"Pf\r\n3 2\r\n-1\r\n",
+        b"Pf \n3 2 \n-1.0 \n",
+        b"Pf\n# made by a program\n3 2\n# little endian\n-1\n",
+        b"Pf # a comment\n3 # width\n2\n-1 # scale\n",
+        b"Pf\n3\n2\n-1\n",
+        b"Pf\n3 2\n-1\n# one more\n",
+    ],
+)
+@pytest.mark.parametrize("first", [0x0, 0xA, 0x20, 0xD, 0x23])
+def test_dialects_of_other_programs(tmp_path: Path, header: bytes, end: bytes, first: int) -> None:
+    """Also where the first byte of the numbers looks like white space or like a comment."""
+    array = np.array([[1, 2, 3], [4, 5, 6]], np.float32)
+    array[1:, :1].view(np.uint8)[0, 0] = first
+    path = tmp_path / "a.PFM"
+    path.write_bytes(header + array[::-1].tobytes() + end)
+    assert same_bits(read_pfm(path), array)
+    path.write_bytes(b"Pf 3 2 -1 " + array[::-1].tobytes())
+    assert same_bits(read_pfm(path), array)
+
+
+def test_a_disparity_of_three_channels(tmp_path: Path) -> None:
+    path = tmp_path / "a.pfm"
+    disparity = np.array([[1, np.nan, np.inf]], np.float32)
+    write_pfm(path, np.repeat(disparity[..., None], 3, axis=2))
+    assert same_bits(read_pfm_disparity(path), disparity)
+    write_pfm(path, np.arange(3, dtype=np.float32).reshape(1, 1, 3))
+    with pytest.raises(FormatError, match=r"a\.pfm: has three channels that differ"):
+        read_pfm_disparity(path)
 
 
 def test_pillow_agrees_on_big_endian(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Every reader on files in the published encoding: values, signs, rows, holes, labels; and the choice of reader."""
 
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from datagen import DatasetError
 from datagen.dataset.shards import CACHE_VARIABLE
+from datagen.formats import read_pfm, write_pfm
 from datagen.ground_truth.from_disparity import derive_occlusion
 from datagen.sources.registry import DataSource, open_source, source_formats
 from datagen.sources.webdataset import scene_of
@@ -264,12 +266,28 @@ def test_wrong_sources_are_sentences(tmp_path: Path) -> None:
         open_source(tmp_path)
     with pytest.raises(DatasetError, match="has no frame with ground truth in the layout of KITTI 2015"):
         open_source(f"kitti2015:{tmp_path}").frames("train")
+    with pytest.raises(DatasetError, match=f"^{tmp_path}/gone: there is no such folder$"):
+        open_source(f"kitti2015:{tmp_path}/gone")
+    with pytest.raises(DatasetError, match=r"gone\.tar: there is no such file$"):
+        open_source(f"webdataset:{tmp_path}/gone.tar")
+    with pytest.raises(DatasetError, match=r"there is no format kiti2015; there are .*kitti2015") as caught:
+        open_source(f"kiti2015:{tmp_path}")
+    assert len(str(caught.value)) < 300
     with pytest.raises(DatasetError, match="say what is there, for example webdataset:s3://bucket/set"):
         open_source("s3://bucket/set")
     published.kitti2015(tmp_path / "a")
     published.sintel(tmp_path / "a")
     with pytest.raises(DatasetError, match="looks like KITTI 2015 and MPI Sintel"):
         open_source(tmp_path / "a")
+
+
+def test_the_home_folder_after_a_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    published.kitti2015(tmp_path / "sets/kitti")
+    for source in ("kitti2015:~/sets/kitti", "~/sets/kitti", "kitti2015:~/sets/kitti#0-0"):
+        assert len(open_source(source).frames("train")) == 1
+    with pytest.raises(DatasetError, match="~nobody-at-all/x: there is no such folder"):
+        open_source("kitti2015:~nobody-at-all/x")
 
 
 @pytest.mark.parametrize(
@@ -366,8 +384,6 @@ class TestShards:
         self.check(open_source(f"webdataset:{url}"))
 
     def test_url_with_index_fetches_what_is_read(self, url: str, tmp_path: Path) -> None:
-        import json
-
         names = {name: list(samples) for name, samples in self.samples().items()}
         fsspec.filesystem("memory").pipe_file(
             f"{url.removeprefix('memory:/')}/index.json", json.dumps({"shards": names}).encode()
@@ -381,6 +397,43 @@ class TestShards:
         assert frames[1:4].groups == [2, 1]  # type: ignore[attr-defined]
         self.check(open_source(f"webdataset:{url}"))
 
+    @pytest.mark.parametrize("indexed", [False, True])
+    @pytest.mark.parametrize("folder", ["wds[v1]", "wds{a,b}", "wds*", "wds?"])
+    def test_a_folder_s_name_is_no_pattern(self, folder: str, indexed: bool, tmp_path: Path) -> None:
+        place = tmp_path / folder
+        place.mkdir()
+        for name, samples in self.samples().items():
+            (place / name).write_bytes(shard(samples))
+        if indexed:
+            names = {name: list(samples) for name, samples in self.samples().items()}
+            (place / "index.json").write_text(json.dumps({"shards": names}))
+        for source in (f"webdataset:{place}", str(place)):
+            self.check(open_source(source))
+        for pattern in ("train-{000000..000001}.tar", "*.tar", "{train-000000,train-000001,val-000000}.tar"):
+            assert len(open_source(f"webdataset:{place}/{pattern}").frames("train")) == 5
+
+    @pytest.mark.parametrize(
+        ("pattern", "count"),
+        [
+            ("train-{000000..000001}.tar", 5),
+            ("train-{000001..000001}.tar", 2),
+            ("train-00000[1-9].tar", 2),
+            ("*.tar", 5),
+            ("{train,val}-000000.tar", 3),
+        ],
+    )
+    def test_shards_are_named_as_webdataset_names_them(self, url: str, pattern: str, count: int) -> None:
+        assert len(open_source(f"webdataset:{url}/{pattern}").frames("train")) == count
+
+    def test_shards_that_are_named_and_not_there_are_sentences(self, url: str, tmp_path: Path) -> None:
+        with pytest.raises(DatasetError, match=r"train-000002\.tar"):
+            open_source(f"webdataset:{url}/train-{{000000..000002}}.tar").frames("train")
+        (tmp_path / "mine.tar").write_bytes(shard({}))
+        with pytest.raises(DatasetError, match=r"mine\.tar: is not named after its split"):
+            open_source(f"webdataset:{tmp_path}/*.tar").frames("train")
+        with pytest.raises(DatasetError, match="more than 1000000 files"):
+            open_source(f"webdataset:{tmp_path}/train-{{000000..999999999}}.tar").frames("train")
+
     def test_a_damaged_index_and_a_missing_bucket_are_sentences(self, url: str) -> None:
         fsspec.filesystem("memory").pipe_file(f"{url.removeprefix('memory:/')}/index.json", b'{"shards": 3}')
         with pytest.raises(DatasetError, match=r"index\.json: is not an index of shards"):
@@ -389,6 +442,50 @@ class TestShards:
             DatasetError, match="no frame with ground truth in the layout of WebDataset shards"
         ):
             open_source("webdataset:memory://nothing/here").frames("train")
+
+
+def test_linked_folders_are_not_lost(tmp_path: Path) -> None:
+    """Two of CREStereo's four folders on another disk; only `Path.rglob` of Python 3.13 follows links."""
+    published.crestereo(tmp_path / "set")
+    shutil.copytree(tmp_path / "set/tree", tmp_path / "set/hole")
+    for name in ("reflective", "shapenet"):
+        shutil.copytree(tmp_path / "set/tree", tmp_path / "disk" / name)
+        (tmp_path / "set" / name).symlink_to(tmp_path / "disk" / name)
+    names = [frame.name for frame in open_source(tmp_path / "set").frames("test")]
+    assert names == ["hole/0a1b", "reflective/0a1b", "shapenet/0a1b", "tree/0a1b"]
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_droppings_are_no_frames(name: str, tmp_path: Path) -> None:
+    """What macOS and Windows leave beside every file, and what an archive made on macOS has in it."""
+    SETS[name](tmp_path)
+    before = [frame.name for frame in open_source(tmp_path).frames("train")]
+    for path in [path for path in tmp_path.rglob("*") if path.is_file()]:
+        path.with_name(f"._{path.name}").write_bytes(b"Mac OS X")
+        (path.parent / ".DS_Store").write_bytes(b"Bud1")
+        (path.parent / "Thumbs.db").write_bytes(b"")
+        (path.parent / "desktop.ini").write_bytes(b"")
+    shutil.copytree(tmp_path, tmp_path / "__MACOSX")
+    source = open_source(tmp_path)
+    assert (source.format.name, [frame.name for frame in source.frames("train")]) == (name, before)
+    assert problem_of(tmp_path) is None
+
+
+@pytest.mark.parametrize("name", ["flyingthings3d", "monkaa", "middlebury", "eth3d"])
+def test_endings_in_upper_case_and_three_channels(name: str, tmp_path: Path) -> None:
+    SETS[name](tmp_path)
+    before = open_source(tmp_path).frames("train")[0].disparity_left
+    for path in list(tmp_path.rglob("*.pfm")):
+        write_pfm(path.with_suffix(".PFM"), np.repeat(read_pfm(path)[..., None], 3, axis=2))
+        path.unlink()
+    np.testing.assert_array_equal(open_source(tmp_path).frames("train")[0].disparity_left, before)
+
+
+def test_droppings_in_shards_are_no_samples(tmp_path: Path) -> None:
+    members = shard_members(world())
+    samples = {"./train-0000-0006": members, "./._train-0000-0006": members, ".DS_Store": {"x": b""}}
+    (tmp_path / "train-000000.tar").write_bytes(shard(samples))
+    assert [frame.name for frame in open_source(tmp_path).frames("train")] == ["train-0000-0006"]
 
 
 def test_frames_do_not_pile_up(tmp_path: Path) -> None:

@@ -91,6 +91,13 @@ def test_files_cut_lengthened_deleted_and_added(own_dataset: Path) -> None:
     assert "manifest/TRAIN/A/.0007.json.1.1.tmp: belongs to no finished scene" in found
 
 
+def test_what_desktops_leave_is_no_damage(own_dataset: Path) -> None:
+    for folder in [own_dataset, *(path for path in own_dataset.rglob("*") if path.is_dir())]:
+        for name in (".DS_Store", "._0006.png", "Thumbs.db", "desktop.ini"):
+            (folder / name).write_bytes(b"Bud1")
+    assert verify_dataset(own_dataset).ok
+
+
 def test_a_scene_without_manifest_is_missing_and_its_files_belong_to_nothing(own_dataset: Path) -> None:
     Layout(own_dataset).manifest("train", 0).unlink()
     found = messages(verify_dataset(own_dataset)).splitlines()

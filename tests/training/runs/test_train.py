@@ -327,7 +327,7 @@ def test_recipes_for_sparse_real_data(run: Path, tmp_path: Path) -> None:
 
     for index in range(2):
         dense = random_pair(np.random.default_rng(index), 80, 140).disparity_left
-        published.pfm(tmp_path / f"pseudo/{index:06d}_10.pfm", dense)
+        published.pfm(tmp_path / f"pseudo/{index:06d}_10.{'pfm' if index else 'PFM'}", dense)
     seen: list[float] = []
     with pytest.MonkeyPatch.context() as patch:
         loss = GradNetTask.loss
@@ -380,7 +380,7 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
     with pytest.raises(TrainingError, match="crops must be multiples of 64 each way, not 100x64"):
         train_quietly("regressor", source, tmp_path, quick("regressor"), changes={"crop_width": 100})
     with pytest.raises(
-        TrainingError, match="correct_within_px does not apply here: a RegressorPreset has steps"
+        TrainingError, match="correct_within_px does not apply here: a RegressorPreset has batch_size"
     ):
         train_quietly("regressor", source, tmp_path, "tiny", changes={"correct_within_px": 3.0})
     with pytest.raises(TrainingError, match="16-bit floats need a GPU; bf16 works on CPUs too"):

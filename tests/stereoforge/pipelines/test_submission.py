@@ -18,7 +18,7 @@ from refine.report.paper_tables import paper_tables
 from stereoforge.errors import UsageError
 from stereoforge.pipelines.prediction import Image, Predictors
 from stereoforge.pipelines.set_evaluation import evaluate_set, evaluation_options, open_test_data
-from stereoforge.pipelines.submission import encode_disparity, find_submission_frames, write_submission
+from stereoforge.pipelines.submission import encode_disparity, find_submission, write_submission
 from training.prediction.predictor import Prediction
 
 SIZE = (20, 60)
@@ -34,34 +34,42 @@ class Brightness:
         return EvaluationFrame(sample.name, sample.left, sample.disparity_left, labels, disparity)
 
 
-def kitti_set(root: Path, testing: bool) -> Path:
+def kitti_set(root: Path, testing: bool, edition: int = 2015) -> Path:
+    images = ("image_2", "image_3") if edition == 2015 else ("colored_0", "colored_1")
+    truths = "disp_occ_0" if edition == 2015 else "disp_occ"
     rng = np.random.default_rng(0)
     for part in ("training", "testing") if testing else ("training",):
         for number in range(2):
-            for folder in ("image_2", "image_3"):
+            for folder in images:
                 path = root / part / folder / f"{number:06d}_10.png"
                 path.parent.mkdir(parents=True, exist_ok=True)
                 iio.imwrite(path, rng.integers(0, 256, (*SIZE, 3), np.uint8))
                 iio.imwrite(path.with_name(f"{number:06d}_11.png"), np.zeros((*SIZE, 3), np.uint8))
-            truth = root / "training" / "disp_occ_0" / f"{number:06d}_10.png"
+            truth = root / "training" / truths / f"{number:06d}_10.png"
             truth.parent.mkdir(exist_ok=True)
             write_png(truth, np.full(SIZE, 2560, np.uint16))
     return root
 
 
-@pytest.mark.parametrize("testing", [True, False])
-def test_the_folder_is_what_the_server_takes(tmp_path: Path, testing: bool) -> None:
-    root = kitti_set(tmp_path / "kitti", testing)
-    frames = find_submission_frames([str(root)])
-    count = write_submission(frames, Brightness(), Regressor(), tmp_path / "out")  # type: ignore[arg-type]
+@pytest.mark.parametrize("edition", [2012, 2015])
+@pytest.mark.parametrize(("testing", "named"), [(True, ""), (False, ""), (True, "training")])
+def test_the_folder_is_what_the_server_takes(tmp_path: Path, testing: bool, named: str, edition: int) -> None:
+    """2012's server takes the files in the root, 2015's in `disp_0`."""
+    root = kitti_set(tmp_path / "kitti", testing, edition)
+    submission = find_submission([f"kitti{edition}:{root / named}"])
+    count = write_submission(submission, Brightness(), Regressor(), tmp_path / "out")  # type: ignore[arg-type]
     assert count == 2
+    assert (submission.note is None) == (testing and not named)
+    if submission.note:
+        assert "training part" in submission.note
     written = sorted(
         path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*.png")
     )
-    assert written == ["disp_0/000000_10.png", "disp_0/000001_10.png"]
-    part = "testing" if testing else "training"
-    red = iio.imread(root / part / "image_2" / "000001_10.png")[..., 0].astype(int)
-    values = read_png(tmp_path / "out" / "disp_0" / "000001_10.png")
+    folder, images = ("disp_0/", "image_2") if edition == 2015 else ("", "colored_0")
+    assert written == [f"{folder}000000_10.png", f"{folder}000001_10.png"]
+    part = "testing" if testing and not named else "training"
+    red = iio.imread(root / part / images / "000001_10.png")[..., 0].astype(int)
+    values = read_png(tmp_path / "out" / written[1])
     assert values.dtype == np.uint16
     np.testing.assert_array_equal(values, np.maximum(red * 256, 1))
 
@@ -108,4 +116,4 @@ def test_zero_means_no_estimate_only() -> None:
 def test_other_sets_cannot_be_submitted(tmp_path: Path) -> None:
     kitti = kitti_set(tmp_path / "kitti", testing=False)
     with pytest.raises(UsageError, match="exactly one KITTI data set, there are 2"):
-        find_submission_frames([str(kitti), f"kitti2015:{kitti}"])
+        find_submission([str(kitti), f"kitti2015:{kitti}"])

@@ -24,7 +24,7 @@ from stereoforge.study.jobs import Job, make_job, run_jobs
 from stereoforge.study.plan import NETWORKS
 from stereoforge_kit.files import alone
 from tests.refine.worlds import toy_frame
-from tests.stereoforge.test_submission import kitti_set
+from tests.stereoforge.pipelines.test_submission import kitti_set
 from training.presets import Preset, find_preset
 
 SIZE = (128, 64)
@@ -153,7 +153,7 @@ def test_only_what_is_trained_on_grows_from_simple_to_complex(
 
 
 def test_the_shipped_plan_can_be_rendered() -> None:
-    plan = read_plan(Path(__file__).parents[2] / "recipes" / "study.yaml")
+    plan = read_plan(Path(__file__).parents[3] / "recipes" / "study.yaml")
     for name in plan.test:
         recipe = plan.recipe(name, ("train", "test"))
         assert (recipe.world.width, recipe.world.height, recipe.seed) == (*plan.size, plan.seed)
@@ -165,7 +165,7 @@ def test_the_shipped_plan_can_be_rendered() -> None:
 
 
 def test_the_shipped_gap_trains_alike_everywhere() -> None:
-    plan = read_plan(Path(__file__).parents[2] / "recipes" / "study_gap.yaml")
+    plan = read_plan(Path(__file__).parents[3] / "recipes" / "study_gap.yaml")
     assert set(plan.train) == set(plan.test) == set(FAMILIES)
     assert len({tuple(domain.steps.items()) for domain in plan.domains.values()}) == 1
     assert len({tuple(domain.scenes.items()) for domain in plan.domains.values()}) == 1
