@@ -29,6 +29,7 @@ highlight_language = "none"  # of blocks that name none: they are of shell
 # A path in single backticks is code, and a link where it names something on these pages.
 default_role = "py:obj"
 
+autoclass_content = "both"
 autodoc_member_order = "bysource"
 autodoc_inherit_docstrings = False  # torch's of forward says nothing of ours
 autodoc_typehints = "description"
@@ -67,12 +68,14 @@ html_theme_options = {
 def read_as_prose(_app: Any, what: str, _name: str, _of: Any, _options: Any, lines: list[str]) -> None:
     """Keep what the docstrings mean as plain text from being taken for markup, before napoleon reads them.
 
-    |x| is an absolute value here and a substitution in reStructuredText. A colon in the first line of an attribute's
-    docstring is punctuation here and ends a type in napoleon's eyes, so that line becomes an empty comment.
+    |x| is an absolute value here and a substitution in reStructuredText, where a word must not go on after a backtick
+    either, as in `Scene`s. A colon in the first line of an attribute's docstring is punctuation here and ends a type
+    for napoleon, so an empty comment becomes the first line.
     """
     for number, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
-            lines[number] = re.sub(r"(`[^`]*`)|\|", lambda found: found[1] or r"\|", line)
+            bars = re.sub(r"(`[^`]*`)|\|", lambda found: found[1] or r"\|", line)
+            lines[number] = re.sub(r"(`[^`]+`)(?=\w)", r"\1\\ ", bars)
     if what in ("attribute", "data", "property"):
         lines[:0] = ["..", ""]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from stereoforge.cli import main
 from stereoforge.commands import command_class
 from tests.docs.pages import PAGES, blocks, name_of
 
+COMMENT = re.compile(r"(^|\s)#.*")
+"""As a shell has it: within a word # is no comment."""
 SHELL_WORDS = {";", "done", "&&"}
 
 
@@ -21,7 +24,7 @@ def commands(page: Path) -> list[list[str]]:
         for line in block.replace("\\\n", " ").splitlines():
             if "stereoforge " not in line or line.startswith(("stereoforge:", "pip ", "#")):
                 continue
-            words = shlex.split(line.replace(";", " ; "), comments=True)
+            words = shlex.split(COMMENT.sub("", line).replace(";", " ; "))
             if "stereoforge" not in words:
                 continue
             words = words[words.index("stereoforge") + 1 :]
