@@ -11,11 +11,11 @@ from pathlib import Path
 
 from datagen.dataset.layout import SPLITS, Layout, SceneKey, scene_numbers
 from datagen.dataset.manifest import SceneManifest
-from datagen.errors import DatasetError, DiskFullError
+from datagen.errors import DatasetError, DiskFullError, MachineError
 from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
 from datagen.executors.devices import assign_devices, find_gpus
 from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_from_text, write_recipe
-from datagen.rendering.preflight import check_device, check_disparity_range
+from datagen.rendering.preflight import NO_BLENDER, check_device, check_disparity_range, has_blender
 from datagen.rendering.quarantine import (
     QuarantinedScene,
     put_in_quarantine,
@@ -27,12 +27,13 @@ from datagen.rendering.run_log import RunLog, run_log
 from datagen.rendering.scene_job import SceneJob, render_scene
 from datagen.rendering.staging import STAGING_FOLDER, StagingArea, discard_uncommitted, staging_area
 from stereoforge_kit.files import LocalTree, Tree, open_tree
-from stereoforge_kit.processes import Limits, available_memory_bytes
+from stereoforge_kit.processes import Limits, available_memory_bytes, check_main_guard
 
 SCENE_TIMEOUT_S = 1800.0
 """How long one scene may take by default."""
 MEMORY_SHARE = 0.8
 """Share of the machine's memory that all workers together may use."""
+LONGEST_SENTENCE = 300
 NO_ROOM_BYTES = 16 << 20
 """With less room than this a failure is put down to the full disk: Blender does not say so itself."""
 
@@ -80,8 +81,11 @@ def render_dataset(
     Raises:
         DatasetError: If the folder has other files or a data set of other settings, if this machine has no such
             device, or if scenes cannot have the disparities asked for. Nothing has been written then.
+        MachineError: If this machine or the calling script is at fault, not a scene: no Blender, no main guard, a
+            folder that cannot be written. The finished scenes are whole, and none is in quarantine for it.
         DiskFullError: If there is no room for more. The finished scenes are whole.
     """
+    check_main_guard()
     tree = open_tree(root)
     if isinstance(tree, LocalTree) and tree.root.exists() and not tree.root.is_dir():
         raise DatasetError(f"{tree.name} is a file, not a folder; give a new or empty folder")
@@ -202,6 +206,8 @@ class _Run:
         )
         if failure.kind == "disk_full" or self._no_room_left():
             raise DiskFullError(self._disk_full_sentence())
+        if failure.kind == "environment":
+            raise MachineError(_machine_sentence(failure.sentence))
         self.in_flight.remove(scene)
         discard_uncommitted(self.tree, *scene)
         put_in_quarantine(self.tree, self.area.folder, self.recipe, *scene, failure, outcome.attempts)
@@ -229,14 +235,25 @@ class _Run:
         )
 
 
+def _machine_sentence(failure: str) -> str:
+    """What stops a run, for a person."""
+    if "No module named 'bpy'" in failure:
+        return NO_BLENDER
+    return f"rendering stopped, no scene is at fault: {failure}"[:LONGEST_SENTENCE]
+
+
 def _check_possible(
     recipe: Recipe, device: str, executor: Executor, tree: Tree, wanted: Sequence[SceneKey]
 ) -> None:
     """Raise DatasetError for what would make every scene fail, instead of putting all of them in quarantine."""
-    asks = device != "cpu" or recipe.curation.disparity_px is not None
+    here = isinstance(executor, LocalExecutor) or (isinstance(executor, RayExecutor) and executor.runs_here)
+    without_blender = here and not has_blender()
+    asks = device != "cpu" or recipe.curation.disparity_px is not None or without_blender
     if not asks or not set(wanted) - committed_scenes(tree):  # to list a large store takes a while
         return
-    if isinstance(executor, LocalExecutor) or (isinstance(executor, RayExecutor) and executor.runs_here):
+    if without_blender:
+        raise MachineError(NO_BLENDER)
+    if here:
         check_device(device)
     check_disparity_range(recipe)
 

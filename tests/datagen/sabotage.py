@@ -6,6 +6,7 @@ import ctypes
 import errno
 import hashlib
 import json
+import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -67,6 +68,9 @@ def spoil(function: Callable[[SceneJob], Any], faults: Mapping[str, str], job: S
         raise RuntimeError("out of ideas")
     elif fault == "fill the disk":
         raise OSError(errno.ENOSPC, "No space left on device", "0006.png")
+    elif fault and fault.startswith("errno "):
+        number = int(fault.removeprefix("errno "))
+        raise OSError(number, os.strerror(number), "0006.png")
     return function(job)
 
 
