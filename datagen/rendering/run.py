@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from zipfile import is_zipfile
 
 from datagen.dataset.layout import SPLITS, Layout, SceneKey, scene_numbers
 from datagen.dataset.manifest import SceneManifest
@@ -25,7 +26,14 @@ from datagen.rendering.quarantine import (
 )
 from datagen.rendering.run_log import RunLog, run_log
 from datagen.rendering.scene_job import SceneJob, render_scene
-from datagen.rendering.staging import STAGING_FOLDER, StagingArea, discard_uncommitted, staging_area
+from datagen.rendering.staging import (
+    STAGING_FOLDER,
+    StagingArea,
+    begun_before,
+    discard_uncommitted,
+    manifest_digest,
+    staging_area,
+)
 from stereoforge_kit.files import LocalTree, Tree, open_tree
 from stereoforge_kit.processes import Limits, available_memory_bytes, check_main_guard
 
@@ -49,7 +57,7 @@ class RenderSummary:
     already_there: int
     """Scenes asked for that were finished before."""
     failures: tuple[QuarantinedScene, ...]
-    """The scenes asked for that are in quarantine now, from this run or an earlier one."""
+    """The scenes asked for that are in quarantine now, from this run or an earlier one, or could not be replaced."""
 
 
 def render_dataset(
@@ -61,6 +69,7 @@ def render_dataset(
     shard: tuple[int, int] = (0, 1),
     executor: Executor | None = None,
     only: Collection[SceneKey] | None = None,
+    again: bool = False,
     on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
 ) -> RenderSummary:
     """Render the missing scenes of a recipe under `root`. Running it again finishes or extends the data set.
@@ -76,6 +85,8 @@ def render_dataset(
         shard: (i, n) renders only every n-th scene from the i-th, so that n machines can share a folder.
         executor: Where scenes are rendered; None for worker processes on this machine.
         only: Render these (split, number) if they are missing, and nothing else.
+        again: Render those in `only` though they are there. Each takes the old one's place when it is whole; one that
+            cannot be rendered stays as it is and goes to no quarantine.
         on_scene: Called after each scene with (scenes done, scenes in all, the manifest or None if it failed).
 
     Raises:
@@ -93,7 +104,7 @@ def render_dataset(
     recipe = fit_disparities(recipe)
     merged = _merge(tree, recipe)
     if wanted:
-        _check_store(tree, recipe)
+        check_store(tree, recipe)
     executor = executor or local_executor(workers, device)
     _check_possible(recipe, device, executor, tree, wanted)
     with staging_area(tree) as area, run_log(tree, area.folder) as log:
@@ -101,12 +112,28 @@ def render_dataset(
         quarantined = set(quarantined_scenes(tree))
         present = committed_scenes(tree)
         chosen = set(wanted) - quarantined if only is None else set(only)
-        missing = [scene for scene in wanted if scene in chosen and scene not in present]
-        jobs = [SceneJob(tree, area, recipe, *scene, device, executor.threads) for scene in missing]
+        missing = [scene for scene in wanted if scene in chosen and (again or scene not in present)]
+        jobs = [
+            SceneJob(
+                tree,
+                area,
+                recipe,
+                *scene,
+                device,
+                executor.threads,
+                manifest_digest(tree, *scene) if scene in present else None,
+            )
+            for scene in missing
+        ]
         run = _Run(tree, area, recipe, log, quarantined, len(jobs), on_scene)
+        if jobs and not isinstance(tree, LocalTree):
+            run.begun_before = begun_before(tree, recipe.scenes)
         run.go(executor, jobs)
     asked = run.quarantined if only is None else run.quarantined & set(only)
-    failures = tuple(read_quarantined(tree, *scene) for scene in wanted if scene in asked)
+    failures = tuple(
+        read_quarantined(tree, *scene) for scene in wanted if scene in asked - run.not_replaced.keys()
+    )
+    failures += tuple(run.not_replaced.values())
     already_there = sum(scene in present for scene in wanted)
     return RenderSummary(replace(merged, scenes=recipe.scenes), run.rendered, already_there, failures)
 
@@ -163,9 +190,13 @@ class _Run:
     quarantined: set[SceneKey]
     total: int
     on_scene: Callable[[int, int, SceneManifest | None], None] | None
+    begun_before: set[SceneKey] = field(default_factory=set)
+    """Scenes behind a URL of which there were files before this run: they are not its to remove."""
+    in_flight: set[SceneKey] = field(default_factory=set)
     rendered: int = 0
     bytes_written: int = 0
-    in_flight: set[SceneKey] = field(default_factory=set)
+    not_replaced: dict[SceneKey, QuarantinedScene] = field(default_factory=dict)
+    """The scenes that could not be rendered again and are as they were."""
 
     def go(self, executor: Executor, jobs: list[SceneJob]) -> None:
         settings = self.recipe.settings_sha256()
@@ -181,13 +212,18 @@ class _Run:
             raise
         finally:
             for scene in self.in_flight:
-                discard_uncommitted(self.tree, *scene)
+                self._discard(scene)
         self.log.write("run_finished", rendered=self.rendered, failed=self.total - self.rendered)
 
     def _handed_out(self, jobs: Iterable[SceneJob]) -> Iterator[SceneJob]:
         for job in jobs:
             self.in_flight.add((job.split, job.scene))
             yield job
+
+    def _discard(self, scene: SceneKey) -> None:
+        """Remove what was uploaded of a scene behind a URL. In a folder the staging area sees to it."""
+        if not isinstance(self.tree, LocalTree) and scene not in self.begun_before:
+            discard_uncommitted(self.tree, *scene)
 
     def _take(self, outcome: Outcome[SceneJob, SceneManifest]) -> None:
         scene = (outcome.job.split, outcome.job.scene)
@@ -209,7 +245,13 @@ class _Run:
         if failure.kind == "environment":
             raise MachineError(_machine_sentence(failure.sentence))
         self.in_flight.remove(scene)
-        discard_uncommitted(self.tree, *scene)
+        self._discard(scene)
+        if outcome.job.replaces is not None:
+            digest = self.recipe.settings_sha256()
+            self.not_replaced[scene] = QuarantinedScene(
+                *scene, failure.kind, failure.sentence, outcome.attempts, digest, record=None
+            )
+            return
         put_in_quarantine(self.tree, self.area.folder, self.recipe, *scene, failure, outcome.attempts)
         self.quarantined.add(scene)
 
@@ -269,7 +311,7 @@ def _merge(tree: Tree, recipe: Recipe) -> Recipe:
     return recipe
 
 
-def _check_store(tree: Tree, recipe: Recipe) -> None:
+def check_store(tree: Tree, recipe: Recipe) -> None:
     """Raise DatasetError unless the user assets that a recipe names are in the data set's store."""
     pool = recipe.assets
     if not pool:
@@ -278,9 +320,10 @@ def _check_store(tree: Tree, recipe: Recipe) -> None:
         raise DatasetError(f"{tree.name}: a recipe with user assets needs a folder, not a URL")
     store = Layout(tree.root).assets
     for asset in (*pool.meshes, *pool.textures, *pool.environments):
-        if not (store / f"{asset.sha256}.npz").is_file():
+        prepared = store / f"{asset.sha256}.npz"
+        if not prepared.is_file() or not is_zipfile(prepared):
             raise DatasetError(
-                f"{tree.name} has no prepared file of {asset.name}, which the recipe names: give the folders of "
+                f"{tree.name} has no whole prepared file of {asset.name}, which the recipe names: give the folders of "
                 "your meshes, textures and environments again"
             )
 
