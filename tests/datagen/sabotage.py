@@ -79,15 +79,19 @@ def hashes(root: Path) -> dict[str, str]:
     found = {}
     for path in sorted(path for path in root.rglob("*") if path.is_file()):
         name = path.relative_to(root).as_posix()
-        if name.startswith(NOT_DATA):
-            continue
-        data = path.read_bytes()
-        if name.startswith("manifest/"):
-            manifest = json.loads(data)
-            del manifest["seconds"], manifest["manifest_sha256"]
-            data = json.dumps(manifest).encode()
-        found[name] = hashlib.sha256(data).hexdigest()
+        if not name.startswith(NOT_DATA):
+            found[name] = file_hash(root, name)
     return found
+
+
+def file_hash(root: Path, name: str) -> str:
+    """SHA-256 of a file, as `hashes` has it."""
+    data = (root / name).read_bytes()
+    if name.startswith("manifest/"):
+        manifest = json.loads(data)
+        del manifest["seconds"], manifest["manifest_sha256"]
+        data = json.dumps(manifest).encode()
+    return hashlib.sha256(data).hexdigest()
 
 
 def without(found: dict[str, str], *scenes: str) -> dict[str, str]:
