@@ -2,6 +2,7 @@
 
     python -m benchmarks.faults kills      [--scenes 300] [--seconds-between-kills 4]
     python -m benchmarks.faults restarts   [--scenes 300] [--kills 20]
+    python -m benchmarks.faults repairs    [--scenes 2] [--kills 20]
     python -m benchmarks.faults disk       [--scenes 12]            (as root: it mounts a small file system)
     python -m benchmarks.faults corrupt    [--trials 1000]
     python -m benchmarks.faults vouched    [--scenes 2] [--trials 1000]
@@ -30,9 +31,10 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import astuple, replace
 from functools import partial
+from itertools import pairwise
 from multiprocessing.connection import wait
 from pathlib import Path
 
@@ -54,7 +56,7 @@ from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, scene_to_json
 from stereoforge_kit.files import open_tree
 from stereoforge_kit.processes import Limits, WorkerError, WorkerProcess
-from tests.datagen.sabotage import Sabotage, hashes, without
+from tests.datagen.sabotage import Sabotage, file_hash, hashes, without
 from training.errors import TrainingError
 
 WORLD = FAMILIES["flying_things"].config(
@@ -168,6 +170,52 @@ def restarts(arguments: argparse.Namespace, folder: Path) -> None:
     leftovers = [path for path in root.iterdir() if path.name.startswith(".")]
     check("no leftovers in the data set", not leftovers and verify_dataset(root, workers=1).ok)
     check("no leftovers in the folder for temporary files", not list(temporary.iterdir()))
+
+
+def repairs(arguments: argparse.Namespace, folder: Path) -> None:
+    """`verify --repair` killed with -9 at random moments: nothing that was intact is ever lost."""
+    recipe, root = tiny(arguments.scenes), folder / "set"
+    render_dataset(recipe, folder / "undisturbed", executor=local())
+    whole = hashes(folder / "undisturbed")
+    shutil.copytree(folder / "undisturbed", root)
+    pictures = sorted(root.glob("frames_cleanpass/TRAIN/A/*/left/*.png"))
+    for number, path in enumerate(pictures):  # One file of each scene; a manifest now and then.
+        victim = root / f"manifest/TRAIN/A/{number:04d}.json" if number % 3 == 2 else path
+        victim.write_bytes(victim.read_bytes()[:-20])
+    words = ["verify", str(root), "--repair", "--workers", "2"]
+    command = [sys.executable, "-m", "stereoforge", *words]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    intact = [intact_files(root, whole)]
+    least, hit = len(intact[0]), 0
+    for _ in range(arguments.kills):
+        process = subprocess.Popen(command, **quiet)
+        deadline = time.monotonic() + random.uniform(0.0, arguments.longest_run)
+        while process.poll() is None and time.monotonic() < deadline:
+            least = min(least, len(intact_files(root, whole)))
+            time.sleep(0.05)
+        hit += process.poll() is None
+        process.kill()
+        process.wait()
+        intact.append(intact_files(root, whole))
+    print(
+        f"  {hit} of {arguments.kills} kills hit a running repair; intact files of {len(whole)} after each:"
+    )
+    print(f"  {list(map(len, intact))}, never fewer than {least}")
+    growing = all(before <= after for before, after in pairwise(intact))
+    check("no intact file is ever lost", growing and least == len(intact[0]))
+    check("the last repair succeeds", subprocess.run(command, check=False, **quiet).returncode == 0)
+    check("the same SHA-256 as undisturbed", hashes(root) == whole)
+    check("no leftovers", not [path for path in root.iterdir() if path.name.startswith(".")])
+
+
+def intact_files(root: Path, whole: dict[str, str]) -> set[str]:
+    """The names of the files that have their bytes of the undisturbed data set."""
+    found = set()
+    for name, digest in whole.items():
+        with suppress(OSError, ValueError, KeyError):
+            if file_hash(root, name) == digest:
+                found.add(name)
+    return found
 
 
 def disk(arguments: argparse.Namespace, folder: Path) -> None:
@@ -425,11 +473,12 @@ def nodes(arguments: argparse.Namespace, folder: Path) -> None:
 
 EXPERIMENTS = {
     function.__name__: function
-    for function in (kills, restarts, disk, corrupt, vouched, flips, memory, throughput, nodes)
+    for function in (kills, restarts, repairs, disk, corrupt, vouched, flips, memory, throughput, nodes)
 }
 SCENES = {
     "kills": 300,
     "restarts": 300,
+    "repairs": 2,
     "disk": 12,
     "vouched": 2,
     "flips": 7,

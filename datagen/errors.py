@@ -13,5 +13,9 @@ class FormatError(DatasetError):
     """A file's bytes are not what its format allows, or an array cannot be stored in the format."""
 
 
+class MachineError(DatasetError):
+    """This machine or the calling script stops the work; no scene is at fault, and none is put in quarantine."""
+
+
 class DiskFullError(DatasetError):
     """There is no room for what should be written; what is there is whole."""

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -35,10 +39,13 @@ def render_channels(world: BuiltWorld, name: str, seed: int, scratch: Path) -> d
     """All channels that Cycles makes, (H, W) float32 each, by their names without the layer's name."""
     world.blender_scene.cycles.seed = seed
     path = scratch / f"{name}.exr"
-    world.blender_scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
     channels: dict[str, NDArray[np.float32]] = {}
     try:
+        with _plain_name(scratch) as folder:
+            world.blender_scene.render.filepath = f"{folder}/{name}.exr"
+            bpy.ops.render.render(write_still=True)
+        if not path.is_file():
+            raise OSError(errno.EIO, "Blender could not write its picture", str(path))
         with OpenEXR.File(str(path), separate_channels=True) as file:
             # Blender 4.5 writes one part with all channels, 5.x one part a pass.
             for part in file.parts:
@@ -47,3 +54,17 @@ def render_channels(world: BuiltWorld, name: str, seed: int, scratch: Path) -> d
     finally:
         path.unlink(missing_ok=True)
     return channels
+
+
+@contextmanager
+def _plain_name(folder: Path) -> Iterator[str]:
+    """Another name of a folder, without anything that Blender interprets.
+
+    In a path of its own Blender takes {fps} for a variable, # for the frame's number and // for the blend file's
+    folder. The user's path may have any of them.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        yield f"/proc/self/fd/{descriptor}"
+    finally:
+        os.close(descriptor)

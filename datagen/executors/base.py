@@ -9,7 +9,7 @@ from typing import Generic, Literal, Protocol, TypeAlias, TypeVar
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-FailureKind = Literal["crash", "killed", "timeout", "memory", "exception", "disk_full"]
+FailureKind = Literal["crash", "killed", "timeout", "memory", "exception", "disk_full", "environment"]
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,7 @@ class Failure:
     """Why a job has no result."""
 
     kind: FailureKind
+    """`disk_full` and `environment` are faults of the machine or the calling script, all others may be the job's."""
     sentence: str
     """What happened, in one sentence."""
     output: str = ""

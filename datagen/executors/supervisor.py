@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from typing import Any
 
-from datagen.executors.base import Failure, Outcome
+from datagen.executors.base import Failure, FailureKind, Outcome
 from stereoforge_kit.processes import Limits, WorkerError, WorkerProcess
 
 MAX_KILLS = 30
@@ -81,7 +81,7 @@ class Supervisor:
         except WorkerError as error:
             failure, result = Failure(error.kind, str(error), self._worker.output()), None
         except Exception as error:  # whatever the job raised is its outcome
-            kind: Any = "disk_full" if getattr(error, "errno", None) in _NO_SPACE else "exception"
+            kind = _kind_of(error)
             sentence = f"{type(error).__name__}: {' '.join(str(error).split())}"
             failure, result = Failure(kind, sentence, self._worker.output()), None
         self._ran_s += self._worker.ran_s
@@ -145,3 +145,11 @@ class Supervisor:
         if used_up or self._worker.resident_bytes() > self.policy.recycle_bytes:
             self._worker.stop()
             self._worker = None
+
+
+def _kind_of(error: Exception) -> FailureKind:
+    """What the system refuses, and modules that cannot be imported, are faults of the machine, not of the job."""
+    number = error.errno if isinstance(error, OSError) else None
+    if number in _NO_SPACE:
+        return "disk_full"
+    return "environment" if number is not None or isinstance(error, ImportError) else "exception"

@@ -20,7 +20,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from datagen.errors import DatasetError
+from datagen.errors import DatasetError, MachineError
 from datagen.executors import LocalExecutor, WorkerPolicy
 from datagen.formats.limits import check_image_size
 from datagen.formats.picture import read_picture
@@ -66,6 +66,7 @@ def import_assets(
 
     Raises:
         DatasetError: For a folder that is missing or has no usable file of its kind.
+        MachineError: If this machine or the calling script, not a file, stops the work.
     """
     store.mkdir(parents=True, exist_ok=True)
     skipped: list[str] = []
@@ -113,6 +114,10 @@ def _import_folder(
             path, prepared = outcome.job
             problem = outcome.result
             if outcome.failure is not None:
+                if outcome.failure.kind in ("environment", "disk_full"):
+                    raise MachineError(
+                        f"importing stopped, no file is at fault: {outcome.failure.sentence}"[:300]
+                    )
                 problem = f"cannot be read, {outcome.failure.sentence}"
             if problem is None:
                 found.append(Asset(path.relative_to(folder).as_posix(), prepared.stem))

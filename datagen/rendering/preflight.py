@@ -1,8 +1,9 @@
-"""Preflight checks: whether this machine has the device, and the family the disparities, that a run needs."""
+"""Preflight checks: whether this machine has Blender and the device, and the family the disparities, for a run."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -15,6 +16,18 @@ from stereoforge_kit.processes import WorkerError, call_limited
 
 DEVICE_TIMEOUT_S = 300.0
 """On its first use a driver may compile for a while."""
+
+NO_BLENDER = (
+    "rendering needs Blender: pip install 'stereoforge[render]' on Python 3.11 (bpy 4.5) or 3.13 (bpy 5.2)"
+)
+
+
+def has_blender() -> bool:
+    """Whether this Python has bpy, without loading it, which takes seconds."""
+    try:
+        return find_spec("bpy") is not None
+    except ValueError:  # Something has put itself in the module's place.
+        return False
 
 
 def check_device(device: str) -> None:

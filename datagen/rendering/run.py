@@ -8,14 +8,15 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from zipfile import is_zipfile
 
 from datagen.dataset.layout import SPLITS, Layout, SceneKey, scene_numbers
 from datagen.dataset.manifest import SceneManifest
-from datagen.errors import DatasetError, DiskFullError
+from datagen.errors import DatasetError, DiskFullError, MachineError
 from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
 from datagen.executors.devices import assign_devices, find_gpus
 from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_from_text, write_recipe
-from datagen.rendering.preflight import check_device, check_disparity_range
+from datagen.rendering.preflight import NO_BLENDER, check_device, check_disparity_range, has_blender
 from datagen.rendering.quarantine import (
     QuarantinedScene,
     put_in_quarantine,
@@ -25,14 +26,21 @@ from datagen.rendering.quarantine import (
 )
 from datagen.rendering.run_log import RunLog, run_log
 from datagen.rendering.scene_job import SceneJob, render_scene
-from datagen.rendering.staging import StagingArea, discard_uncommitted, staging_area
+from datagen.rendering.staging import (
+    StagingArea,
+    begun_before,
+    discard_uncommitted,
+    manifest_digest,
+    staging_area,
+)
 from stereoforge_kit.files import LocalTree, Tree, open_tree
-from stereoforge_kit.processes import Limits, available_memory_bytes
+from stereoforge_kit.processes import Limits, available_memory_bytes, check_main_guard
 
 SCENE_TIMEOUT_S = 1800.0
 """How long one scene may take by default."""
 MEMORY_SHARE = 0.8
 """Share of the machine's memory that all workers together may use."""
+LONGEST_SENTENCE = 300
 NO_ROOM_BYTES = 16 << 20
 """With less room than this a failure is put down to the full disk: Blender does not say so itself."""
 
@@ -48,7 +56,7 @@ class RenderSummary:
     already_there: int
     """Scenes asked for that were finished before."""
     failures: tuple[QuarantinedScene, ...]
-    """The scenes asked for that are in quarantine now, from this run or an earlier one."""
+    """The scenes asked for that are in quarantine now, from this run or an earlier one, or could not be replaced."""
 
 
 def render_dataset(
@@ -60,6 +68,7 @@ def render_dataset(
     shard: tuple[int, int] = (0, 1),
     executor: Executor | None = None,
     only: Collection[SceneKey] | None = None,
+    again: bool = False,
     on_scene: Callable[[int, int, SceneManifest | None], None] | None = None,
 ) -> RenderSummary:
     """Render the missing scenes of a recipe under `root`. Running it again finishes or extends the data set.
@@ -75,13 +84,18 @@ def render_dataset(
         shard: (i, n) renders only every n-th scene from the i-th, so that n machines can share a folder.
         executor: Where scenes are rendered; None for worker processes on this machine.
         only: Render these (split, number) if they are missing, and nothing else.
+        again: Render those in `only` though they are there. Each takes the old one's place when it is whole; one that
+            cannot be rendered stays as it is and goes to no quarantine.
         on_scene: Called after each scene with (scenes done, scenes in all, the manifest or None if it failed).
 
     Raises:
         DatasetError: If the folder has other files or a data set of other settings, if this machine has no such
             device, or if scenes cannot have the disparities asked for. Nothing has been written then.
+        MachineError: If this machine or the calling script is at fault, not a scene: no Blender, no main guard, a
+            folder that cannot be written. The finished scenes are whole, and none is in quarantine for it.
         DiskFullError: If there is no room for more. The finished scenes are whole.
     """
+    check_main_guard()
     tree = open_tree(root)
     if isinstance(tree, LocalTree) and tree.root.exists() and not tree.root.is_dir():
         raise DatasetError(f"{tree.name} is a file, not a folder; give a new or empty folder")
@@ -89,7 +103,7 @@ def render_dataset(
     recipe = fit_disparities(recipe)
     merged = _merge(tree, recipe)
     if wanted:
-        _check_store(tree, recipe)
+        check_store(tree, recipe)
     executor = executor or local_executor(workers, device)
     _check_possible(recipe, device, executor, tree, wanted)
     with staging_area(tree) as area, run_log(tree, area.folder) as log:
@@ -97,12 +111,28 @@ def render_dataset(
         quarantined = set(quarantined_scenes(tree))
         present = committed_scenes(tree)
         chosen = set(wanted) - quarantined if only is None else set(only)
-        missing = [scene for scene in wanted if scene in chosen and scene not in present]
-        jobs = [SceneJob(tree, area, recipe, *scene, device, executor.threads) for scene in missing]
+        missing = [scene for scene in wanted if scene in chosen and (again or scene not in present)]
+        jobs = [
+            SceneJob(
+                tree,
+                area,
+                recipe,
+                *scene,
+                device,
+                executor.threads,
+                manifest_digest(tree, *scene) if scene in present else None,
+            )
+            for scene in missing
+        ]
         run = _Run(tree, area, recipe, log, quarantined, len(jobs), on_scene)
+        if jobs and not isinstance(tree, LocalTree):
+            run.begun_before = begun_before(tree, recipe.scenes)
         run.go(executor, jobs)
     asked = run.quarantined if only is None else run.quarantined & set(only)
-    failures = tuple(read_quarantined(tree, *scene) for scene in wanted if scene in asked)
+    failures = tuple(
+        read_quarantined(tree, *scene) for scene in wanted if scene in asked - run.not_replaced.keys()
+    )
+    failures += tuple(run.not_replaced.values())
     already_there = sum(scene in present for scene in wanted)
     return RenderSummary(replace(merged, scenes=recipe.scenes), run.rendered, already_there, failures)
 
@@ -159,9 +189,13 @@ class _Run:
     quarantined: set[SceneKey]
     total: int
     on_scene: Callable[[int, int, SceneManifest | None], None] | None
+    begun_before: set[SceneKey] = field(default_factory=set)
+    """Scenes behind a URL of which there were files before this run: they are not its to remove."""
+    in_flight: set[SceneKey] = field(default_factory=set)
     rendered: int = 0
     bytes_written: int = 0
-    in_flight: set[SceneKey] = field(default_factory=set)
+    not_replaced: dict[SceneKey, QuarantinedScene] = field(default_factory=dict)
+    """The scenes that could not be rendered again and are as they were."""
 
     def go(self, executor: Executor, jobs: list[SceneJob]) -> None:
         settings = self.recipe.settings_sha256()
@@ -177,13 +211,18 @@ class _Run:
             raise
         finally:
             for scene in self.in_flight:
-                discard_uncommitted(self.tree, *scene)
+                self._discard(scene)
         self.log.write("run_finished", rendered=self.rendered, failed=self.total - self.rendered)
 
     def _handed_out(self, jobs: Iterable[SceneJob]) -> Iterator[SceneJob]:
         for job in jobs:
             self.in_flight.add((job.split, job.scene))
             yield job
+
+    def _discard(self, scene: SceneKey) -> None:
+        """Remove what was uploaded of a scene behind a URL. In a folder the staging area sees to it."""
+        if not isinstance(self.tree, LocalTree) and scene not in self.begun_before:
+            discard_uncommitted(self.tree, *scene)
 
     def _take(self, outcome: Outcome[SceneJob, SceneManifest]) -> None:
         scene = (outcome.job.split, outcome.job.scene)
@@ -202,8 +241,16 @@ class _Run:
         )
         if failure.kind == "disk_full" or self._no_room_left():
             raise DiskFullError(self._disk_full_sentence())
+        if failure.kind == "environment":
+            raise MachineError(_machine_sentence(failure.sentence))
         self.in_flight.remove(scene)
-        discard_uncommitted(self.tree, *scene)
+        self._discard(scene)
+        if outcome.job.replaces is not None:
+            digest = self.recipe.settings_sha256()
+            self.not_replaced[scene] = QuarantinedScene(
+                *scene, failure.kind, failure.sentence, outcome.attempts, digest, record=None
+            )
+            return
         put_in_quarantine(self.tree, self.area.folder, self.recipe, *scene, failure, outcome.attempts)
         self.quarantined.add(scene)
 
@@ -229,14 +276,25 @@ class _Run:
         )
 
 
+def _machine_sentence(failure: str) -> str:
+    """What stops a run, for a person."""
+    if "No module named 'bpy'" in failure:
+        return NO_BLENDER
+    return f"rendering stopped, no scene is at fault: {failure}"[:LONGEST_SENTENCE]
+
+
 def _check_possible(
     recipe: Recipe, device: str, executor: Executor, tree: Tree, wanted: Sequence[SceneKey]
 ) -> None:
     """Raise DatasetError for what would make every scene fail, instead of putting all of them in quarantine."""
-    asks = device != "cpu" or recipe.curation.disparity_px is not None
+    here = isinstance(executor, LocalExecutor) or (isinstance(executor, RayExecutor) and executor.runs_here)
+    without_blender = here and not has_blender()
+    asks = device != "cpu" or recipe.curation.disparity_px is not None or without_blender
     if not asks or not set(wanted) - committed_scenes(tree):  # to list a large store takes a while
         return
-    if isinstance(executor, LocalExecutor) or (isinstance(executor, RayExecutor) and executor.runs_here):
+    if without_blender:
+        raise MachineError(NO_BLENDER)
+    if here:
         check_device(device)
     check_disparity_range(recipe)
 
@@ -252,7 +310,7 @@ def _merge(tree: Tree, recipe: Recipe) -> Recipe:
     return recipe
 
 
-def _check_store(tree: Tree, recipe: Recipe) -> None:
+def check_store(tree: Tree, recipe: Recipe) -> None:
     """Raise DatasetError unless the user assets that a recipe names are in the data set's store."""
     pool = recipe.assets
     if not pool:
@@ -261,9 +319,10 @@ def _check_store(tree: Tree, recipe: Recipe) -> None:
         raise DatasetError(f"{tree.name}: a recipe with user assets needs a folder, not a URL")
     store = Layout(tree.root).assets
     for asset in (*pool.meshes, *pool.textures, *pool.environments):
-        if not (store / f"{asset.sha256}.npz").is_file():
+        prepared = store / f"{asset.sha256}.npz"
+        if not prepared.is_file() or not is_zipfile(prepared):
             raise DatasetError(
-                f"{tree.name} has no prepared file of {asset.name}, which the recipe names: give the folders of "
+                f"{tree.name} has no whole prepared file of {asset.name}, which the recipe names: give the folders of "
                 "your meshes, textures and environments again"
             )
 

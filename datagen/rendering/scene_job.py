@@ -31,7 +31,7 @@ from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.curation import TEXTURELESS, fault_before_rendering, is_textureless
 from datagen.recipe.recipe import Recipe
 from datagen.rendering.frames import BLENDER_LOG, RenderOptions, Stopwatch, ViewTargets, render_frames
-from datagen.rendering.staging import StagingArea
+from datagen.rendering.staging import StagingArea, commit
 from scenes import Scene, scene_to_json
 from scenes.user_assets.pool import UserEnvironment, UserMesh, UserTexture, use_store
 from stereoforge_kit.files import LocalTree, Tree, write_text
@@ -50,6 +50,8 @@ class SceneJob:
     scene: int
     device: str = "cpu"
     threads: int = 1
+    replaces: str | None = None
+    """`manifest_digest` of the scene whose place it takes when it is whole; None for a scene that is missing."""
 
     @property
     def name(self) -> str:
@@ -182,14 +184,9 @@ def _commit(job: SceneJob, staging: Path, watch: Stopwatch, statistics: dict[str
     """Move the staged scene into the data set, its manifest last."""
     files = sorted(path for path in staging.rglob("*") if path.is_file())
     manifest = _manifest(job, staging, files, watch, statistics)
-    staged_manifest = Layout(staging).manifest(job.split, job.scene)
-    write_manifest(staged_manifest, manifest)
-    name = staged_manifest.relative_to(staging).as_posix()
+    write_manifest(Layout(staging).manifest(job.split, job.scene), manifest)
     with job.area.committing(job.split, job.scene):
-        if not job.tree.exists(name):
-            for source in sorted({_unit(path, staging) for path in files}):
-                job.tree.adopt(source, source.relative_to(staging).as_posix())
-            job.tree.adopt(staged_manifest, name)
+        commit(job.tree, staging, job.split, job.scene, job.replaces)
     return manifest
 
 
@@ -212,9 +209,3 @@ def _manifest(
             "numpy": np.__version__,
         },
     )
-
-
-def _unit(path: Path, root: Path) -> Path:
-    """What is moved as a whole with a staged file: the folder that it is in, or the scene's single record."""
-    kind, split, group, scene, *_ = path.relative_to(root).parts
-    return root / kind / split / group / scene

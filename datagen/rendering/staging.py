@@ -1,22 +1,27 @@
 """Staging: scenes are made apart and then committed, so that a killed run leaves nothing behind.
 
 In a data set's folder every run has a staging area of its own, `.staging/<run>`, and keeps it locked while it lives. An
-area whose lock is free belongs to a run that is gone. The next run removes it, and also what its unfinished scenes had
-already moved into the data set. Behind a URL scenes are staged in the temporary files of the machine that renders
-them, in folders locked in the same way. What was uploaded of an unfinished scene is replaced when the scene is
-rendered again.
+area whose lock is free belongs to a run that is gone, and the next run removes it. A scene that is whole in there says
+so in a file, its commit record, before the first of its files is moved into the data set; whoever clears the area
+finishes the move. So nothing is ever taken out of a data set but by what takes its place. Behind a URL scenes are
+staged in the temporary files of the machine that renders them, in folders locked in the same way. What was uploaded of
+an unfinished scene is removed by its run, or replaced when the scene is rendered again.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
-from datagen.dataset.layout import SPLITS, Layout, SceneKey
+from datagen.dataset.layout import KINDS, Layout, SceneKey
+from datagen.dataset.manifest import SceneManifest, read_manifest
+from datagen.rendering.quarantine import release
 from stereoforge_kit.files import (
     LocalTree,
     TemporaryFolders,
@@ -25,12 +30,16 @@ from stereoforge_kit.files import (
     remove_folder,
     temporary_files_in,
     temporary_folder,
+    write_text,
 )
 
 STAGING_FOLDER = ".staging"
 """The data set's folder of staging areas."""
 COMMITS = "commits"
 """Name of the lock that every commit of an area shares, and that clearing the area takes alone."""
+COMMIT_RECORD = "commit.json"
+"""The file beside a staged scene that says that the scene is whole, and what it replaces."""
+SCENE = "scene"
 
 
 @dataclass(frozen=True)
@@ -45,7 +54,7 @@ class StagingArea:
     def scene_folder(self, split: str, scene: int) -> Iterator[Path]:
         """A new, empty folder for one attempt at a scene. This process's temporary files are beside it meanwhile."""
         with self._attempt(split, scene) as attempt:
-            staged, temporary = attempt / "scene", attempt / "temporary"
+            staged, temporary = attempt / SCENE, attempt / "temporary"
             staged.mkdir()
             temporary.mkdir()
             with temporary_files_in(temporary):
@@ -58,10 +67,13 @@ class StagingArea:
                 yield folder
             return
         folder = Path(tempfile.mkdtemp(prefix=f"{split}-{scene}-", dir=self.folder))
+        done = False
         try:
             yield folder
+            done = True
         finally:
-            remove_folder(folder)
+            if done or not (folder / COMMIT_RECORD).exists():
+                remove_folder(folder)
 
     @contextmanager
     def committing(self, split: str, scene: int) -> Iterator[None]:
@@ -89,7 +101,7 @@ def staging_area(tree: Tree) -> Iterator[StagingArea]:
 
 
 def _clear(tree: Tree, area: Path) -> None:
-    """Remove a staging area, and what its unfinished scenes had already moved into the data set.
+    """Remove a staging area, after what it had begun to move into the data set is there.
 
     A commit that another machine is making is waited for; no other begins.
     """
@@ -97,25 +109,96 @@ def _clear(tree: Tree, area: Path) -> None:
         suppress(FileNotFoundError),
         locked(area / COMMITS),
     ):  # Somebody may have removed the whole data set.
-        for split, scene in _unfinished_scenes(area):
-            discard_uncommitted(tree, split, scene)
+        for attempt in sorted(path for path in area.iterdir() if path.is_dir()):
+            finish_commit(tree, attempt)
         remove_folder(area)
 
 
-def _unfinished_scenes(area: Path) -> set[SceneKey]:
-    """(split, number) of every scene that was being made in an area."""
+def manifest_digest(tree: Tree, split: str, scene: int) -> str | None:
+    """SHA-256 of a scene's manifest as it is, damaged or not; None if there is none."""
+    name = Layout(Path()).manifest(split, scene).as_posix()
+    return hashlib.sha256(tree.read(name)).hexdigest() if tree.exists(name) else None
+
+
+def commit(tree: Tree, staged: Path, split: str, scene: int, replaces: str | None) -> None:
+    """Move a staged scene, which is whole, into the data set, its manifest last.
+
+    Args:
+        tree: The data set's folder or URL.
+        staged: The folder of `StagingArea.scene_folder`.
+        split, scene: Which scene it is.
+        replaces: `manifest_digest` of the scene whose place it takes; None where there is none. If another has taken
+            that place meanwhile, nothing is done.
+    """
+    record = {"split": split, "scene": scene, "replaces": replaces}
+    write_text(staged.parent / COMMIT_RECORD, json.dumps(record))
+    finish_commit(tree, staged.parent)
+
+
+def finish_commit(tree: Tree, attempt: Path) -> None:
+    """Move what is left of a staged scene, if its commit was begun and no other attempt has been faster."""
+    path = attempt / COMMIT_RECORD
+    if not path.is_file():
+        return
+    record = json.loads(path.read_text())
+    split, scene, replaces = record["split"], record["scene"], record["replaces"]
+    if manifest_digest(tree, split, scene) != replaces:
+        return
+    staged = attempt / SCENE
+    manifest = Layout(staged).manifest(split, scene)
+    files = sorted(file for file in staged.rglob("*") if file.is_file() and file != manifest)
+    units = files if replaces else sorted({_unit(file, staged) for file in files})
+    for source in units:
+        name = source.relative_to(staged).as_posix()
+        if not (replaces and _is_same(tree, name, source)):
+            tree.adopt(source, name)
+    for name in _outdated(tree, manifest.relative_to(staged).as_posix(), read_manifest(manifest)):
+        tree.remove(name)
+    tree.adopt(manifest, manifest.relative_to(staged).as_posix())
+    release(tree, split, scene)
+
+
+def begun_before(tree: Tree, splits: Iterable[str]) -> set[SceneKey]:
+    """(split, number) of every scene that has a folder of files of any kind behind a URL, finished or not."""
     found = set()
-    for path in area.iterdir():
-        split, _, rest = path.name.partition("-")
-        number = rest.split("-")[0]
-        if path.is_dir() and split in SPLITS and number.isdigit():
-            found.add((split, int(number)))
+    for split in splits:
+        for kind in KINDS:
+            folder = Layout(Path()).scene_folder(kind, split, 0).parent.as_posix()
+            found |= {(split, int(name)) for name in tree.files_in(folder) if name.isdigit()}
     return found
 
 
 def discard_uncommitted(tree: Tree, split: str, scene: int) -> None:
-    """Remove the files of a scene that has no manifest."""
+    """Remove what was uploaded of a scene that has no manifest and was not there before the run."""
     *parts, manifest = (path.as_posix() for path in Layout(Path()).scene_paths(split, scene))
     if not tree.exists(manifest):
         for part in parts:
             tree.remove(part)
+
+
+def _is_same(tree: Tree, name: str, source: Path) -> bool:
+    """Whether the data set has a file with the same bytes."""
+    try:
+        return tree.exists(name) and tree.read(name) == source.read_bytes()
+    except OSError:  # What cannot be read is replaced.
+        return False
+
+
+def _outdated(tree: Tree, name: str, new: SceneManifest) -> list[str]:
+    """The files that a scene has by its present manifest, if that can be read, and not by its new one."""
+    try:
+        old = json.loads(tree.read(name))
+        listed = {PurePosixPath(entry["path"]) for entry in old["files"]}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return []
+    listed -= {PurePosixPath(entry.path) for entry in new.files}
+    parts = Layout(Path()).scene_paths(new.split, new.scene)[:-1]
+    # A damaged manifest may name any path.
+    own = (path for path in listed if ".." not in path.parts and any(map(path.is_relative_to, parts)))
+    return sorted(path.as_posix() for path in own)
+
+
+def _unit(path: Path, root: Path) -> Path:
+    """What is moved as a whole with a staged file: the folder that it is in, or the scene's single record."""
+    kind, split, group, scene, *_ = path.relative_to(root).parts
+    return root / kind / split / group / scene

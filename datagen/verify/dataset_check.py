@@ -11,6 +11,7 @@ from pathlib import Path
 from datagen.dataset.layout import KINDS, SPLITS, Layout, SceneKey
 from datagen.dataset.remote_cache import RemoteLayout, open_remote
 from datagen.dataset.samples import open_layout
+from datagen.errors import MachineError
 from datagen.recipe.recipe import Recipe, read_recipe, recipe_to_text
 from datagen.rendering.quarantine import quarantined_scenes
 from datagen.rendering.run import local_executor
@@ -108,6 +109,8 @@ def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
                 assert outcome.result is not None
                 yield outcome.result
             else:
+                if outcome.failure.kind == "environment":
+                    raise MachineError(f"checking stopped: {outcome.failure.sentence}"[:300])
                 outcome.job.could_not_run(outcome.failure.sentence)
                 yield outcome.job
 

@@ -15,7 +15,9 @@ class Problem:
     """What is wrong, as the end of a sentence that begins with the place."""
     split: str | None = None
     scene: int | None = None
-    """The number of the scene to render again; None if no finished scene is at fault."""
+    """The number of the scene; None if the problem is no finished scene's."""
+    unchecked: bool = False
+    """Whether something else than the scene kept it from being checked, so that it may well be intact."""
 
     def __str__(self) -> str:
         place = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in self.place)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,9 +21,11 @@ from datagen.recipe.recipe import Recipe
 from datagen.verify.frame_check import FrameCheck
 from datagen.verify.report import Problem
 from scenes import Scene
+from stereoforge_kit.errors import InputError
 
 SAMPLED_PIXELS = 500
 """Number of random pixels of each view that are compared with the scene's geometry by default."""
+FORBIDDEN = os.strerror(errno.EACCES)
 POSE_TOLERANCE = 1e-9
 """How far an element of a pose may be from the scene's."""
 
@@ -63,16 +67,27 @@ class SceneCheck:
             except DatasetError as error:
                 self._failed(error)
             else:
-                caster = SceneRayCaster(build_geometry(scene)) if self.sampled_pixels else None
-                self._check_contents(scene, caster)
+                self._check_contents(scene, self._caster(scene))
         return self
 
     def could_not_run(self, sentence: str) -> None:
         """Record that the process that ran this check failed."""
-        self._found(self.layout.scene_record(self.split, self.scene), f"could not be checked: {sentence}")
+        record = self.layout.scene_record(self.split, self.scene)
+        self._found(record, f"could not be checked: {sentence}", unchecked=True)
 
-    def _found(self, path: Path, message: str) -> None:
-        self.problems.append(Problem(self.layout.relative(path), message, self.split, self.scene))
+    def _caster(self, scene: Scene) -> SceneRayCaster | None:
+        """What casts rays at the scene; None if that is not asked for, or not possible: a user's mesh is missing."""
+        if not self.sampled_pixels:
+            return None
+        try:
+            return SceneRayCaster(build_geometry(scene))
+        except InputError as error:
+            record = self.layout.scene_record(self.split, self.scene)
+            self._found(record, f"its geometry could not be checked: {error}", unchecked=True)
+            return None
+
+    def _found(self, path: Path, message: str, unchecked: bool = False) -> None:
+        self.problems.append(Problem(self.layout.relative(path), message, self.split, self.scene, unchecked))
 
     def _failed(self, error: ValueError) -> None:
         """Record a reader's error; its message begins with the file's whole path."""
@@ -91,7 +106,8 @@ class SceneCheck:
         self.files += 1
         self.bytes_read += size
         if problem:
-            self._found(self.layout.root / entry.path, problem)
+            # Bytes that nobody may read, or that a store does not hand out now, may well be right.
+            self._found(self.layout.root / entry.path, problem, unchecked=problem.endswith(FORBIDDEN))
         return problem is None
 
     def _are_readable(self, paths: list[Path]) -> bool:

@@ -8,9 +8,12 @@ Because names are contents, it does not matter in which store a file is found.
 from __future__ import annotations
 
 import re
+import struct
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,13 +38,19 @@ def _check_sha256(text: str) -> None:
 
 
 def _load(sha256: str) -> dict[str, NDArray[np.generic]]:
-    """The arrays of a prepared file. Raises ValueError for a file that is in no store."""
+    """The arrays of a prepared file. Raises InputError for a file that is in no store, or only damaged."""
     _check_sha256(sha256)
+    damaged = None
     for folder in _stores:
         path = folder / f"{sha256}.npz"
         if path.is_file():
-            with np.load(path, allow_pickle=False) as arrays:
-                return dict(arrays)
+            try:
+                with np.load(path, allow_pickle=False) as arrays:
+                    return dict(arrays)
+            except (ValueError, EOFError, KeyError, RuntimeError, BadZipFile, zlib.error, struct.error):
+                damaged = path
+    if damaged:
+        raise InputError(f"{damaged}: is damaged; give the folders of your files again")
     raise InputError(f"the user's file {sha256[:12]}... is in no store; give the folders it came from again")
 
 

@@ -13,6 +13,7 @@ import tyro
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_methods, several, shown
+from stereoforge.places import keep_apart
 from stereoforge.progress import console
 
 
@@ -63,6 +64,10 @@ class Evaluate:
             raise UsageError(f"--seed must not be negative, got {self.seed}")
         if self.posterior < 0:
             raise UsageError(f"--posterior must not be negative, got {self.posterior}")
+        for source in self.data:
+            keep_apart("--out", self.out, "the data set", source)
+            if self.submission is not None:
+                keep_apart("--submission", self.submission, "the data set", source)
         from stereoforge.pipelines.prediction import (
             fallback_notes,
             open_predictors,

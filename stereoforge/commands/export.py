@@ -11,8 +11,10 @@ from datagen import StereoDataset
 from datagen.dataset.layout import SPLITS
 from datagen.dataset.samples import open_layout
 from datagen.export import EXPORTERS, ExportOptions
+from datagen.export.folder import export_folder, export_record
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import shown
+from stereoforge.places import keep_apart
 from stereoforge.progress import console, progress_bar
 from stereoforge_kit.files import open_tree
 
@@ -26,13 +28,16 @@ class Export:
     format: Annotated[Literal["kitti", "sceneflow", "webdataset"], shown("kitti|sceneflow|webdataset")]
     """kitti: 16-bit PNG disparities; sceneflow: what FlyingThings3D has and no more; webdataset: tar files."""
     out: Annotated[str, shown("DIR2")]
-    """Folder or URL to write to."""
+    """Folder or URL to write to: new, empty, or with the same export, which continues."""
     render_pass: Annotated[Literal["clean", "final"], shown("clean|final")] = "clean"
     """Which images to take."""
     frames_per_shard: Annotated[int, shown("N")] = 256
     """webdataset: frames in one tar file."""
     lidar_beams: Annotated[int | None, shown("N", "every pixel")] = None
     """kitti: keep only the disparities that a laser scanner with so many beams would measure (KITTI's has 64)."""
+
+    overwrite: bool = False
+    """Replace another export that is in --out, once this one is whole (behind a URL, before it is)."""
 
     def run(self) -> None:
         """Write the data set in the other layout, showing progress."""
@@ -41,8 +46,8 @@ class Export:
         if self.lidar_beams is not None and self.lidar_beams < 1:
             raise UsageError(f"--lidar-beams must be at least 1, got {self.lidar_beams}")
         layout, out = open_layout(self.data), open_tree(self.out)
-        if out == layout.tree:
-            raise UsageError("--out must be another place than the data set's")
+        keep_apart("--out", self.out, "the data set", self.data)
+        keep_apart("the data set", self.data, "--out", self.out)
         sets = [
             StereoDataset(self.data, split, self.render_pass)
             for split in SPLITS
@@ -50,11 +55,16 @@ class Export:
         ]
         if not sets:
             raise CommandError(f"{self.data}: has no finished scene")
-        with progress_bar() as progress:
+        options = {
+            "webdataset": {"frames_per_shard": self.frames_per_shard},
+            "kitti": {"lidar_beams": self.lidar_beams},
+        }
+        record = export_record(self.format, sets, options.get(self.format, {}))
+        with export_folder(out, record, overwrite=self.overwrite) as target, progress_bar() as progress:
             task = progress.add_task("exporting", total=None)
             EXPORTERS[self.format](
                 sets,
-                out,
+                target,
                 ExportOptions(self.frames_per_shard, self.lidar_beams),
                 lambda done, total: progress.update(task, completed=done, total=total),
             )

@@ -14,12 +14,22 @@ from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import shown
 from stereoforge.inputs.images import read_color_images
+from stereoforge.places import keep_apart
 from stereoforge.progress import console
 
 if TYPE_CHECKING:
     from refine.mrf.solve import MRFSolution
     from training.prediction.predictor import Prediction
 
+WRITTEN = (
+    "disparity.pfm",
+    "disparity_initial.pfm",
+    "confidence.pfm",
+    "deviation.pfm",
+    "gradient.exr",
+    "overview.png",
+)
+"""What is written into --out."""
 POSTERIOR_SAMPLES = 32
 """For --deviation: each pixel's deviation is off by an eighth of itself."""
 
@@ -125,6 +135,11 @@ class Refine:
             raise UsageError("--disparity-right goes with --disparity")
         if self.out.exists() and not self.out.is_dir():
             raise UsageError(f"--out {self.out}: is a file, not a folder")
+        for name in WRITTEN:
+            keep_apart("--out", self.out / name, "LEFT", self.left)
+            keep_apart("--out", self.out / name, "RIGHT", self.right)
+            keep_apart("--out", self.out / name, "--disparity", self.disparity)
+            keep_apart("--out", self.out / name, "--disparity-right", self.disparity_right)
 
     def _write(
         self,

@@ -22,6 +22,7 @@ from datagen.rendering.run import SCENE_TIMEOUT_S, local_executor, ray_executor
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_histogram, parse_range, parse_shard, parse_size, shown
+from stereoforge.places import keep_apart
 from stereoforge.progress import console, progress_bar
 from stereoforge_kit.files import open_tree, temporary_folder
 from stereoforge_kit.viewing import duration
@@ -103,6 +104,8 @@ class Render:
         parse_shard(self.shard)
         if not self.out:
             raise UsageError("--out needs a folder or a URL")
+        for flag in ("meshes", "textures", "environments"):
+            keep_apart("--out", self.out, f"--{flag}", getattr(self, flag))
         if self.dry_run and self.only_failed:
             raise UsageError(
                 "--dry-run counts what is missing, not what is in quarantine: leave --only-failed out"

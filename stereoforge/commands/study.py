@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from scenes import FAMILIES
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import parse_counts, parse_methods, parse_size, shown
+from stereoforge.places import keep_apart
 from stereoforge.progress import console
 
 if TYPE_CHECKING:
@@ -58,6 +59,8 @@ class Study:
     def run(self) -> None:
         """Run every step that is not done yet, then write the results."""
         plan = self._plan()
+        for domain in plan.domains.values():
+            keep_apart("--out", self.out, "the domain", domain.source)
         from stereoforge.study import run_study
 
         result = run_study(plan, self.out, device=self.device)

@@ -10,6 +10,7 @@ import tyro
 
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import parse_size, parse_weighted_source, several, shown
+from stereoforge.places import keep_apart
 from stereoforge.progress import console
 from stereoforge_kit.files import write_bytes
 
@@ -94,6 +95,15 @@ class Train:
             if value is not None and value < least:
                 raise UsageError(f"--{name} must be at least {least}, got {value}")
         data = [parse_weighted_source(text) for text in self.data]
+        for source, _ in data:
+            keep_apart("--out", self.out, "--data", source)
+        for validation in self.validation:
+            keep_apart("--out", self.out, "--validation", validation)
+        keep_apart("--out", self.out, "--pseudo-labels", self.pseudo_labels)
+        if (
+            self.task == "regressor"
+        ):  # Others add to the run folder; this one would replace what it starts from.
+            keep_apart("--out", self.out, "--init", self.init)
         if self.task == "rdf":
             self._train_forest([source for source, _ in data])
             return

@@ -10,6 +10,7 @@ import tyro
 
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_methods, several, shown
+from stereoforge.places import keep_apart
 from stereoforge.progress import console
 
 
@@ -47,6 +48,8 @@ class Tune:
             raise UsageError(f"--frames must be at least 1, got {self.frames}")
         if not self.data:
             raise UsageError("tune needs at least one data set")
+        for source in self.data:
+            keep_apart("--out", self.out or self.weights, "the data set", source)
         methods = parse_methods(self.methods)
         from rich.table import Table
 

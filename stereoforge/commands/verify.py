@@ -11,8 +11,9 @@ from typing import Annotated
 import tyro
 
 from datagen.dataset.manifest import SceneManifest
+from datagen.rendering.run import local_executor
 from datagen.verify.dataset_check import verify_dataset
-from datagen.verify.repair import broken_scenes, problems_left, repair_dataset
+from datagen.verify.repair import broken_scenes, check_repairable, problems_left, repair_dataset
 from datagen.verify.report import VerifyReport
 from datagen.verify.scene_check import SAMPLED_PIXELS
 from stereoforge.errors import CommandError, UsageError
@@ -20,6 +21,7 @@ from stereoforge.inputs.flag_values import shown
 from stereoforge.progress import console, progress_bar
 
 PROBLEMS_SHOWN = 50
+NAMES_SHOWN = 5
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,10 @@ class Verify:
     data: Annotated[tyro.conf.Positional[str], shown("DIR")]
     """Folder of the data set, or its URL."""
     repair: bool = False
-    """Render the broken scenes again, exactly those, and check them again."""
+    """Render the broken scenes again, exactly those, and check them again. Each takes the old one's place when it is
+    whole; whatever is intact, or only could not be checked, is not touched."""
+    dry_run: bool = False
+    """With --repair: say what would be rendered again, or why it cannot be, and touch nothing."""
     workers: Annotated[int | None, shown("N", "one a core")] = None
     """Worker processes."""
     geometry_pixels: Annotated[int, shown("N")] = SAMPLED_PIXELS
@@ -41,20 +46,36 @@ class Verify:
             raise UsageError(f"--workers must be at least 1, got {self.workers}")
         if self.geometry_pixels < 0:
             raise UsageError(f"--geometry-pixels must be at least 0, got {self.geometry_pixels}")
+        if self.dry_run and not self.repair:
+            raise UsageError("--dry-run goes with --repair: without it nothing is written anyway")
         report = self._verify()
         _print_problems(report)
-        broken = broken_scenes(report.problems)
-        if self.repair and broken:
-            console.print(f"{report}; rendering {len(broken)} scenes again")
-            self._repair(broken)
-            unfinished = len(problems_left(report.problems, broken))
-            report = self._verify(broken)
-            _print_problems(report)
-            if unfinished:
-                raise CommandError(f"{report}; {unfinished} problems are in no finished scene and are left")
+        if self.repair and not report.ok:
+            report = self._repaired(report)
         if not report.ok:
             raise CommandError(str(report))
         console.print(str(report))
+
+    def _repaired(self, report: VerifyReport) -> VerifyReport:
+        """Repair what can be; the report of the scenes rendered again. Raises CommandError if problems are left."""
+        broken = broken_scenes(report.problems)
+        if not broken:
+            raise CommandError(
+                f"{report}; no finished scene is known to be broken, so nothing is rendered again"
+            )
+        check_repairable(self.data, broken)
+        names = ", ".join(f"{split}/{scene:04d}" for split, scene in broken[:NAMES_SHOWN])
+        names += ", ..." if len(broken) > NAMES_SHOWN else ""
+        if self.dry_run:
+            raise CommandError(f"{report}; --repair would render {len(broken)} scenes again: {names}")
+        console.print(f"{report}; rendering {len(broken)} scenes again: {names}")
+        self._repair(broken)
+        left = len(problems_left(self.data, report.problems, broken))
+        report = self._verify(broken)
+        _print_problems(report)
+        if left:
+            raise CommandError(f"{report}; {left} problems are of no broken scene and are left")
+        return report
 
     def _verify(self, only: Collection[tuple[str, int]] | None = None) -> VerifyReport:
         cores = len(os.sched_getaffinity(0))
@@ -73,10 +94,14 @@ class Verify:
             def on_scene(done: int, total: int, _: SceneManifest | None) -> None:
                 on_progress(done, total)
 
-            summary = repair_dataset(self.data, broken, on_scene=on_scene)
+            executor = local_executor(self.workers)
+            summary = repair_dataset(self.data, broken, executor=executor, on_scene=on_scene)
         if summary.failures:
-            names = ", ".join(entry.name for entry in summary.failures)
-            raise CommandError(f"{self.data}: {names} could not be rendered again, see quarantine")
+            first, count = summary.failures[0], len(summary.failures)
+            raise CommandError(
+                f"{self.data}: {count} scenes could not be rendered again and are as they were, {first.name} because: "
+                f"{first.reason}"[:300]
+            )
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from stereoforge_kit.files.atomic import TEMPORARY_SUFFIX, replacing, write_bytes, write_text
 from stereoforge_kit.files.locks import alone, locked
+from stereoforge_kit.files.places import is_within
 from stereoforge_kit.files.temporary import (
     TemporaryFolders,
     remove_folder,
@@ -19,6 +20,7 @@ __all__ = [
     "Tree",
     "alone",
     "is_data",
+    "is_within",
     "locked",
     "matching",
     "open_tree",

@@ -2,7 +2,12 @@
 
 from stereoforge_kit.processes.call import call_limited
 from stereoforge_kit.processes.limits import Limits, available_memory_bytes
-from stereoforge_kit.processes.process import WorkerError, WorkerProcess, captured_output
+from stereoforge_kit.processes.process import (
+    WorkerError,
+    WorkerProcess,
+    captured_output,
+    check_main_guard,
+)
 
 __all__ = [
     "Limits",
@@ -11,4 +16,5 @@ __all__ = [
     "available_memory_bytes",
     "call_limited",
     "captured_output",
+    "check_main_guard",
 ]

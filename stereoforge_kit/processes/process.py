@@ -38,9 +38,12 @@ OUTPUT_BYTES_KEPT = 1 << 18
 HEADROOM_BYTES = 1 << 30
 """Address space granted beyond the limit of resident memory: stacks, arenas and buffers nobody touches."""
 
-FailureKind = Literal["crash", "killed", "timeout", "memory"]
+FailureKind = Literal["crash", "killed", "timeout", "memory", "environment"]
 _PR_SET_PDEATHSIG = 1
 _BEGUN = "begun"
+_NAME = "stereoforge-worker"
+_NO_MAIN_GUARD = 97
+"""The exit code of a process that was to import the calling script and was asked to start processes by it."""
 _SIGNALS_FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 
 _capture: Path | None = None
@@ -52,7 +55,8 @@ class WorkerError(UserError):
     def __init__(self, kind: FailureKind, sentence: str) -> None:
         super().__init__(sentence)
         self.kind = kind
-        """`killed`: by someone outside, so probably through no fault of the call."""
+        """`killed`: by someone outside, so probably through no fault of the call; `environment`: the process never
+        came up, through no fault of the call either."""
 
     def __reduce__(self) -> tuple[type[WorkerError], tuple[FailureKind, str]]:
         return WorkerError, (self.kind, str(self))
@@ -91,6 +95,16 @@ def captured_output() -> Path | None:
     return _capture
 
 
+def check_main_guard() -> None:
+    """End this process if it is a worker that has not come up yet: a script without a main guard asks it for work.
+
+    A spawned process imports the calling script. The process that waits for this one says what is wrong.
+    """
+    process = multiprocessing.current_process()
+    if process.name == _NAME and getattr(process, "_inheriting", False):
+        raise SystemExit(_NO_MAIN_GUARD)
+
+
 class WorkerProcess:
     """A spawned process that makes one call at a time.
 
@@ -100,6 +114,7 @@ class WorkerProcess:
 
     def __init__(self, limits: Limits | None = None, environment: Mapping[str, str] | None = None) -> None:
         """environment: variables for the process, there before it imports anything."""
+        check_main_guard()
         self.limits = limits or Limits()
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  (lives as long as the worker; has no name)
         context = multiprocessing.get_context("spawn")
@@ -107,7 +122,7 @@ class WorkerProcess:
         self._process: BaseProcess = context.Process(
             target=_serve,
             args=(theirs, _Inherited(self._output.fileno()), os.getpid(), self.limits),
-            name="stereoforge-worker",
+            name=_NAME,
         )
         with _variables(environment or {}):
             self._process.start()
@@ -226,12 +241,26 @@ class WorkerProcess:
         code = self._process.exitcode
         if code is None:
             return self._ended("crash", "its process closed the connection without an answer")
+        if code >= 0 and not self.begun:
+            return _Raised(WorkerError("environment", _never_came_up(code)))
         if code >= 0:
             return _Raised(WorkerError("crash", f"its process ended with exit code {code}"))
         name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
         if -code in _SIGNALS_FROM_OUTSIDE:
             return _Raised(WorkerError("killed", f"its process was killed from outside ({name})"))
         return _Raised(WorkerError("crash", f"its process crashed ({name})"))
+
+
+def _never_came_up(code: int) -> str:
+    if code == _NO_MAIN_GUARD:
+        return (
+            "worker processes import the calling script, which has no main guard: put what it does behind "
+            'if __name__ == "__main__":'
+        )
+    return (
+        f"a worker process ended with exit code {code} while it imported the calling script, before its first call; "
+        "the reason is printed above"
+    )
 
 
 def _over_memory(used: int, limit: int) -> str:

@@ -6,6 +6,7 @@ import ctypes
 import errno
 import hashlib
 import json
+import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -67,6 +68,9 @@ def spoil(function: Callable[[SceneJob], Any], faults: Mapping[str, str], job: S
         raise RuntimeError("out of ideas")
     elif fault == "fill the disk":
         raise OSError(errno.ENOSPC, "No space left on device", "0006.png")
+    elif fault and fault.startswith("errno "):
+        number = int(fault.removeprefix("errno "))
+        raise OSError(number, os.strerror(number), "0006.png")
     return function(job)
 
 
@@ -75,15 +79,19 @@ def hashes(root: Path) -> dict[str, str]:
     found = {}
     for path in sorted(path for path in root.rglob("*") if path.is_file()):
         name = path.relative_to(root).as_posix()
-        if name.startswith(NOT_DATA):
-            continue
-        data = path.read_bytes()
-        if name.startswith("manifest/"):
-            manifest = json.loads(data)
-            del manifest["seconds"], manifest["manifest_sha256"]
-            data = json.dumps(manifest).encode()
-        found[name] = hashlib.sha256(data).hexdigest()
+        if not name.startswith(NOT_DATA):
+            found[name] = file_hash(root, name)
     return found
+
+
+def file_hash(root: Path, name: str) -> str:
+    """SHA-256 of a file, as `hashes` has it."""
+    data = (root / name).read_bytes()
+    if name.startswith("manifest/"):
+        manifest = json.loads(data)
+        del manifest["seconds"], manifest["manifest_sha256"]
+        data = json.dumps(manifest).encode()
+    return hashlib.sha256(data).hexdigest()
 
 
 def without(found: dict[str, str], *scenes: str) -> dict[str, str]:

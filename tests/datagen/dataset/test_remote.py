@@ -168,7 +168,13 @@ def test_exporting_from_a_bucket_to_a_bucket(bucket: str, analytic_dataset: Path
             main(["export", str(data), "--format", "webdataset", "--out", str(out)])
         assert end.value.code == 0
     tree = open_tree(f"{bucket}/shards")
-    assert tree.files_in("") == ["index.json", "recipe.yaml", "test-000000.tar", "train-000000.tar"]
+    assert tree.files_in("") == [
+        "export.json",
+        "index.json",
+        "recipe.yaml",
+        "test-000000.tar",
+        "train-000000.tar",
+    ]
     for name in tree.files_in(""):
         assert tree.read(name) == (tmp_path / "shards" / name).read_bytes()
 

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from datagen import render_dataset
 from datagen.dataset.layout import Layout
 from datagen.executors import Failure
 from datagen.rendering.quarantine import put_in_quarantine
+from datagen.verify.repair import repair_dataset
 from stereoforge.cli import main
 from stereoforge_kit.files import LocalTree
-from tests.datagen.sabotage import RECIPE, hashes
+from tests.datagen.sabotage import ONE_WORKER, RECIPE, Sabotage, hashes
+
+CHECKOUT = Path(__file__).parents[3]
 
 
 def verify(root: Path, *flags: str) -> int:
@@ -42,7 +49,7 @@ def test_broken_scenes_and_no_others_are_rendered_again(
     assert verify(root, "--repair") == 1
     said = capfd.readouterr()
     assert "rendering 2 scenes again" in " ".join(said.out.split())
-    assert "are in no finished scene and are left" in said.err
+    assert "are of no broken scene and are left" in said.err
     whole = hashes(small_reference)
     assert hashes(root) == {name: digest for name, digest in whole.items() if "/0003" not in name}
     assert layout.manifest("train", 0).read_bytes() == untouched
@@ -55,3 +62,151 @@ def test_a_repaired_data_set_is_right_again(small_reference: Path, tmp_path: Pat
     Layout(root).manifest("train", 2).write_text('{"family":')  # Its files then belong to no finished scene.
     assert verify(root, "--repair") == 0
     assert hashes(root) == hashes(small_reference)
+
+
+def files(root: Path) -> dict[str, bytes]:
+    """Every file of the data: no log."""
+    found = (path for path in root.rglob("*") if path.is_file())
+    named = {path.relative_to(root).as_posix(): path.read_bytes() for path in found}
+    return {name: data for name, data in named.items() if not name.startswith("logs/")}
+
+
+def repair(root: Path, capfd: pytest.CaptureFixture[str], *flags: str) -> tuple[int, str]:
+    """Exit code and last words of a repair in this process."""
+    capfd.readouterr()
+    with pytest.raises(SystemExit) as end:
+        main(["verify", str(root), "--repair", *flags])
+    said = capfd.readouterr().err.splitlines()
+    assert len(said) <= 1
+    assert all(len(sentence) <= 300 + len(str(root)) for sentence in said)
+    return int(end.value.code or 0), "".join(said)
+
+
+def damage(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+@pytest.fixture(scope="module")
+def with_meshes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A rendered scene with a mesh of the user's; not to be changed."""
+    folder = tmp_path_factory.mktemp("own")
+    meshes = folder / "meshes"
+    meshes.mkdir()
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+    for number in range(3):  # Enough for one of them to fall to the train split.
+        (meshes / f"{number}.obj").write_text(f"# {number}\n{corners}f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    words = ["--scenes", "1", "--size", "64x36", "--samples", "1", "--workers", "1", "--meshes", str(meshes)]
+    with pytest.raises(SystemExit) as end:
+        main(["render", *words, "--out", str(folder / "set")])
+    assert end.value.code == 0
+    return folder / "set"
+
+
+@pytest.mark.slow
+def test_without_its_assets_a_set_keeps_every_file(
+    with_meshes: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    root = Path(shutil.copytree(with_meshes, tmp_path / "set"))
+    shutil.rmtree(root / "assets")
+    before = files(root)
+    code, said = repair(root, capfd)
+    assert code == 1
+    assert "no finished scene is known to be broken" in said
+    assert files(root) == before
+    damage(Layout(root).file("frames_cleanpass", "train", 0, "left", 6))
+    before = files(root)
+    code, said = repair(root, capfd)
+    assert code == 1
+    assert "has no whole prepared file of" in said
+    assert files(root) == before
+
+
+@pytest.mark.slow
+def test_a_truncated_asset_costs_nothing(
+    with_meshes: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    root = Path(shutil.copytree(with_meshes, tmp_path / "set"))
+    for asset in (root / "assets").glob("*.npz"):
+        asset.write_bytes(asset.read_bytes()[:200])
+    damage(Layout(root).file("frames_cleanpass", "train", 0, "left", 6))
+    before = files(root)
+    code, said = repair(root, capfd, "--dry-run")
+    assert code == 1
+    assert "has no whole prepared file of" in said
+    assert repair(root, capfd)[0] == 1
+    assert files(root) == before
+
+
+BLOCK = """
+import sys
+class Blocked:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == "bpy":
+            raise ModuleNotFoundError("No module named 'bpy'", name="bpy")
+sys.meta_path.insert(0, Blocked())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("module", ["sitecustomize", "bpy"])
+def test_a_machine_without_blender_touches_nothing(
+    small_reference: Path, tmp_path: Path, module: str
+) -> None:
+    root = Path(shutil.copytree(small_reference, tmp_path / "set"))
+    damage(Layout(root).file("disparity", "train", 1, "left", 6))
+    before = files(root)
+    (tmp_path / "hidden").mkdir()
+    raising = "raise ModuleNotFoundError(\"No module named 'bpy'\", name='bpy')"
+    (tmp_path / f"hidden/{module}.py").write_text(BLOCK if module == "sitecustomize" else raising)
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path / 'hidden'}{os.pathsep}{CHECKOUT}"}
+    ended = subprocess.run(
+        [sys.executable, "-m", "stereoforge", "verify", str(root), "--repair", "--geometry-pixels", "0"],
+        env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("stereoforge: rendering needs Blender"), ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+    assert files(root) == before
+
+
+@pytest.mark.slow
+def test_a_dry_run_says_what_would_be_done(
+    small_reference: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    root = Path(shutil.copytree(small_reference, tmp_path / "set"))
+    damage(Layout(root).file("disparity", "train", 1, "left", 6))
+    before = files(root)
+    code, said = repair(root, capfd, "--dry-run")
+    assert code == 1
+    assert "--repair would render 1 scenes again: train/0001" in said
+    assert files(root) == before
+
+
+def test_a_recipe_that_no_scene_was_rendered_by_replaces_none(
+    small_reference: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    root = Path(shutil.copytree(small_reference, tmp_path / "set"))
+    recipe = root / "recipe.yaml"
+    recipe.write_text(recipe.read_text().replace("seed: 3", "seed: 4"))
+    before = files(root)
+    code, said = repair(root, capfd)
+    assert code == 1
+    assert "is not the recipe that any of the scenes was rendered by" in said
+    assert files(root) == before
+
+
+@pytest.mark.slow
+def test_a_scene_that_cannot_be_rendered_again_stays_as_it_is(small_reference: Path, tmp_path: Path) -> None:
+    root = Path(shutil.copytree(small_reference, tmp_path / "set"))
+    damage(Layout(root).file("disparity", "train", 1, "left", 6))
+    before = files(root)
+    summary = repair_dataset(root, [("train", 1)], executor=Sabotage(ONE_WORKER, {"train/0001": "raise"}))
+    assert [entry.reason for entry in summary.failures] == ["RuntimeError: out of ideas"]
+    assert files(root) == before
+    Layout(root).manifest("train", 2).unlink()  # Whoever lost it has all the rest of the scene.
+    before = files(root)
+    summary = render_dataset(RECIPE, root, executor=Sabotage(ONE_WORKER, {"train/0002": "raise"}))
+    assert len(summary.failures) == 1
+    assert before.items() <= files(root).items()
