@@ -25,6 +25,7 @@ from datagen.formats import (
     read_pfm,
     read_png,
 )
+from datagen.formats.impossible_disparity import ImpossibleShare
 from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.png import read_png_size
 from scenes import Scene, scene_from_json
@@ -98,6 +99,11 @@ class StereoSample:
     def disparity_right(self) -> NDArray[np.float32]:
         """(H, W) pixels, x_left = x_right + d; NaN invalid, 0 infinitely far."""
         return self._disparity("right")
+
+    @property
+    def impossible_left(self) -> ImpossibleShare:
+        """None: these disparities are exact, and a file that was changed is found by its SHA-256."""
+        return ImpossibleShare()
 
     @property
     def gradient_left(self) -> NDArray[np.float32]:

@@ -1,32 +1,61 @@
-"""The image files of other people's data sets: PNG, JPEG and the portable maps PGM and PPM."""
+"""One reader for all pictures: those of data sets, of a user's pair and of user assets.
+
+PNG files are checked chunk by chunk, and PGM and PPM files byte by byte. Pillow reads the headers of all others,
+decodes them and tells how they are to be turned. OpenCV decodes TIFF files of 16 bits, which Pillow cuts to 8.
+"""
 
 from __future__ import annotations
 
+import io
 import re
-import struct
+import warnings
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import ExifTags, Image, ImageOps
+from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from datagen.errors import FormatError
 from datagen.formats.limits import check_image_size, read_bounded
-from datagen.formats.png import read_png
+from datagen.formats.png import decode_png, read_png
 
 _PNM_HEADER = re.compile(rb"P([56])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})\s+(\d{1,5})\s")
-_JPEG_STANDALONE = {0x01, *range(0xD0, 0xD8)}
-_JPEG_FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
-_MOST_JPEG_SEGMENTS = 100_000
-"""Fill bytes count as one segment each."""
-_JPEG_END = b"\xff\xd9"
+_FORMATS = ("JPEG", "TIFF", "WEBP", "BMP", "GIF", "JPEG2000", "PPM")
+"""Pillow's names of what is read beside PNG; none of them starts another program."""
+_FLOAT_MAPS = (b"PF", b"Pf")
+_TWELVE_BITS = 4095
+_TIFF = (b"II*\0", b"MM\0*")
+_WIDTH, _HEIGHT, _BITS_PER_SAMPLE = 256, 257, 258
+"""Tags of TIFF."""
+_TURNS = {
+    2: lambda pixels: pixels[:, ::-1],
+    3: lambda pixels: pixels[::-1, ::-1],
+    4: lambda pixels: pixels[::-1],
+    5: lambda pixels: np.swapaxes(pixels, 0, 1),
+    6: lambda pixels: np.rot90(pixels, -1),
+    7: lambda pixels: np.swapaxes(pixels[::-1, ::-1], 0, 1),
+    8: np.rot90,
+}
+"""What brings a picture upright, by its Exif orientation."""
+
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+class PictureKindError(FormatError):
+    """A picture that is whole, but of a kind or a size that cannot be used."""
 
 
 def read_picture(path: Path | str) -> NDArray[np.uint8]:
-    """Read an image as (H, W, 3) uint8 RGB: grey is repeated, alpha dropped, 16 bits are scaled to 8.
+    """Read an image as (H, W, 3) uint8 RGB, upright.
 
-    Raises FormatError for a file that is missing, damaged, or none of PNG, JPEG, PGM and PPM.
+    The Exif orientation is applied. Grey is repeated, CMYK and palettes are converted. What is transparent shows white
+    behind it. 16 bits are scaled to 8; where no value is above 4095 the picture has 12 bits, and these are scaled to 8.
+
+    Raises FormatError for a file that is missing or damaged, PictureKindError for one that holds several pictures, or
+    numbers that are no colours, or more pixels than a picture has.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -36,13 +65,23 @@ def read_picture(path: Path | str) -> NDArray[np.uint8]:
     >>> image.tolist()
     [[[7, 7, 7], [200, 200, 200]]]
     """
-    path = Path(path)
-    pixels = read_jpeg(path) if path.suffix.lower() in (".jpg", ".jpeg") else read_raster(path)
-    if pixels.dtype == np.uint16:
-        pixels = np.rint(pixels / 257.0).astype(np.uint8)
-    if pixels.ndim == 2:
-        pixels = np.repeat(pixels[..., None], 3, axis=2)
-    return np.ascontiguousarray(pixels[..., :3], np.uint8)
+    pixels = _decode(Path(path))
+    return _as_color(pixels, _full_scale(pixels))
+
+
+def read_pair(left: Path | str, right: Path | str) -> tuple[NDArray[np.uint8], NDArray[np.uint8], list[str]]:
+    """Read both views as `read_picture` does, with the same scale of brightness, and remarks about them.
+
+    Views of 16 bits are taken for 12 bits only if both fit. Raises as `read_picture` does.
+    """
+    views = _decode(Path(left)), _decode(Path(right))
+    deep = [pixels for pixels in views if pixels.dtype == np.uint16]
+    full = max(map(_full_scale, deep), default=255)
+    images = [_as_color(pixels, full if pixels.dtype == np.uint16 else 255) for pixels in views]
+    remarks = (
+        ["the pictures have 12 bits in 16-bit files; they are stretched"] if full == _TWELVE_BITS else []
+    )
+    return images[0], images[1], remarks
 
 
 def read_raster(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
@@ -79,33 +118,125 @@ def read_pnm(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
     return values.astype(np.uint8) if kind.itemsize == 1 else values.astype(np.uint16)
 
 
-def read_jpeg(path: Path | str) -> NDArray[np.uint8]:
-    """Read a JPEG file as (H, W, 3) uint8 RGB. Raises FormatError for a file that is missing, damaged or none."""
-    path = Path(path)
+def _decode(path: Path) -> Pixels:
+    """The numbers of any picture, upright: (H, W) grey or (H, W, C) grey with alpha, RGB, or RGB with alpha."""
     data = read_bounded(path)
-    check_image_size(path, *_jpeg_size(path, data), channels=3)
-    if _JPEG_END not in data[-64:]:
-        raise FormatError(f"{path}: is a JPEG file cut off after {len(data)} bytes")
-    image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-    if image is None:
-        raise FormatError(f"{path}: is a JPEG file whose pixels do not decode")
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
+    if data[:2] in _FLOAT_MAPS:
+        raise PictureKindError(f"{path}: is a map of numbers, not a picture")
+    if data.startswith(b"\x89PNG"):
+        pixels = decode_png(data, str(path))
+        return _turned(pixels, _png_orientation(data)) if b"eXIf" in data else pixels
+    if data[:2] in (b"P5", b"P6"):
+        return read_pnm(path)
+    return _decode_with_pillow(path, data)
 
 
-def _jpeg_size(path: Path, data: bytes) -> tuple[int, int]:
-    """(width, height) from the frame header, found by walking the segments before it."""
-    position = 2
-    if not data.startswith(b"\xff\xd8"):
-        raise FormatError(f"{path}: is not a JPEG file")
-    segments = 0
-    while position + 9 <= len(data) and data[position] == 0xFF and segments < _MOST_JPEG_SEGMENTS:
-        segments += 1
-        marker = data[position + 1]
-        if marker in _JPEG_FRAMES:
-            height, width = struct.unpack_from(">HH", data, position + 5)
-            return width, height
-        if marker in _JPEG_STANDALONE or marker == 0xFF:
-            position += 1 if marker == 0xFF else 2
-        else:
-            position += 2 + struct.unpack_from(">H", data, position + 2)[0]
-    raise FormatError(f"{path}: is a JPEG file without a frame header")
+def _png_orientation(data: bytes) -> int:
+    with Image.open(io.BytesIO(data)) as image:
+        return int(image.getexif().get(ExifTags.Base.Orientation, 1))
+
+
+def _turned(pixels: Pixels, orientation: int) -> Pixels:
+    return np.ascontiguousarray(_TURNS[orientation](pixels)) if orientation in _TURNS else pixels
+
+
+def _decode_with_pillow(path: Path, data: bytes) -> Pixels:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Of odd metadata, and of sizes, which are checked here.
+            if data[:4] in _TIFF and _is_deep(path, data):
+                return _decode_deep_tiff(path, data)
+            with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+                _check_kind(path, image)
+                image.load()
+                return _as_array(path, ImageOps.exif_transpose(image))
+    except FormatError:
+        raise
+    except Image.DecompressionBombError as error:
+        raise PictureKindError(f"{path}: has more pixels than a picture of a data set") from error
+    except Exception as error:  # Every decoder has its own exceptions, in words of its own.
+        raise FormatError(
+            f"{path}: is no picture that can be read (PNG, JPEG, TIFF, ...), or a damaged one"
+        ) from error
+
+
+def _check_kind(path: Path, image: Image.Image) -> None:
+    """Refuse by the header what should not be decoded."""
+    _check_size(path, *image.size)
+    pictures = getattr(image, "n_frames", 1)
+    if pictures > 1 and image.format != "MPO":  # Telephones add a preview or a map of brightness.
+        raise PictureKindError(f"{path}: holds {pictures} pictures; one is needed")
+    if image.mode == "F":
+        raise _odd_values(path, "float32")
+
+
+def _check_size(path: Path, width: int, height: int) -> None:
+    try:
+        check_image_size(path, width, height, channels=3)
+    except FormatError as error:
+        raise PictureKindError(str(error)) from error
+
+
+def _is_deep(path: Path, data: bytes) -> bool:
+    """Whether a TIFF file has more than 8 bits a channel, by its header."""
+    file = io.BytesIO(data)
+    tags = ImageFileDirectory_v2(file.read(8))
+    file.seek(tags.next)
+    tags.load(file)
+    if max(tags.get(_BITS_PER_SAMPLE, (1,))) <= 8:
+        return False
+    _check_size(path, tags[_WIDTH], tags[_HEIGHT])
+    if tags.next:
+        raise PictureKindError(f"{path}: holds several pictures; one is needed")
+    return True
+
+
+def _decode_deep_tiff(path: Path, data: bytes) -> Pixels:
+    """OpenCV turns it upright itself."""
+    pixels: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise FormatError(f"{path}: is a TIFF file whose pixels do not decode")
+    if pixels.dtype != np.uint16:
+        raise _odd_values(path, str(pixels.dtype))
+    if pixels.ndim == 3 and pixels.shape[2] in (3, 4):
+        pixels = cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB if pixels.shape[2] == 3 else cv2.COLOR_BGRA2RGBA)
+    return np.asarray(pixels)
+
+
+def _as_array(path: Path, image: Image.Image) -> Pixels:
+    """What Pillow decoded, without palettes and colour spaces of other kinds."""
+    if image.mode.startswith("I;16"):
+        return np.asarray(image).astype(np.uint16)
+    if image.mode in ("I", "F"):
+        raise _odd_values(path, "int32" if image.mode == "I" else "float32")
+    if image.has_transparency_data:
+        return np.asarray(image.convert("RGBA"))
+    return np.asarray(image.convert("L" if image.mode in ("1", "L") else "RGB"))
+
+
+def _odd_values(path: Path, kind: str) -> PictureKindError:
+    return PictureKindError(f"{path}: holds {kind} values; a picture has 8 or 16 bits a channel")
+
+
+def _full_scale(pixels: Pixels) -> int:
+    """The number that stands for full brightness."""
+    if pixels.dtype == np.uint8:
+        return 255
+    return _TWELVE_BITS if pixels.max() <= _TWELVE_BITS else 65535
+
+
+def _as_color(pixels: Pixels, full: int) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8 of what was decoded, over white."""
+    if pixels.ndim == 2:
+        pixels = pixels[..., None]
+    channels = pixels.shape[2]
+    color, alpha = (pixels[..., :-1], pixels[..., -1:]) if channels in (2, 4) else (pixels, None)
+    if alpha is not None and (alpha < full).any():
+        # In float32 this is exact for 8 bits.
+        opacity = np.minimum(alpha.astype(np.float32) / full, 1)
+        color = color * (255 / full) * opacity + 255 * (1 - opacity)
+    elif full != 255:
+        color = color * (255 / full)
+    if color.dtype != np.uint8:
+        color = np.rint(np.minimum(color, 255)).astype(np.uint8)
+    return np.ascontiguousarray(np.repeat(color, 3, axis=2) if color.shape[2] == 1 else color)

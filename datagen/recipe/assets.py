@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from datagen.errors import DatasetError
 from datagen.executors import LocalExecutor, WorkerPolicy
 from datagen.formats.limits import check_image_size
+from datagen.formats.picture import read_picture
 from scenes.geometry.building import solid
 from scenes.user_assets.pool import Asset, AssetPool
 from stereoforge_kit.errors import InputError
@@ -168,14 +169,11 @@ def prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
 
 
 def prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
-    """A texture's `image`, (H, W, 3) uint8 sRGB.
+    """A texture's `image`, (H, W, 3) uint8 sRGB, as `datagen.formats.picture` reads it.
 
-    Raises ValueError for a file of no use, and whatever the parser raises.
+    Raises FormatError for a file of no use.
     """
-    image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR)
-    if image is None:
-        raise InputError("its pixels do not decode")
-    return {"image": cv2.cvtColor(_bounded(image), cv2.COLOR_BGR2RGB)}
+    return {"image": _bounded(read_picture(path))}
 
 
 def prepare_environment(path: Path) -> dict[str, NDArray[np.generic]]:

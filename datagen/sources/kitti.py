@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from datagen.errors import FormatError
 from datagen.formats import read_png
+from datagen.formats.impossible_disparity import drop_impossible
 from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.picture import read_picture
 from datagen.ground_truth.from_disparity import occlusion_from_mask
@@ -74,7 +75,7 @@ def read_labels(all_points: Path, visible_points: Path) -> NDArray[np.uint8]:
 
     Raises FormatError.
     """
-    disparity = read_disparity(all_points)
+    disparity, _ = drop_impossible(read_disparity(all_points))
     not_visible = np.isnan(read_disparity(visible_points)) & ~np.isnan(disparity)
     return occlusion_from_mask(disparity, not_visible)
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.formats import read_pfm_disparity, read_png
+from datagen.formats.impossible_disparity import drop_impossible
 from datagen.formats.picture import read_picture
 from datagen.ground_truth.from_disparity import occlusion_from_mask
 from datagen.sources.registry import SourceFormat
@@ -44,7 +45,7 @@ def read_disparity(path: Path) -> NDArray[np.float32]:
 
 def read_labels(disparity_left: Path, mask: Path) -> NDArray[np.uint8]:
     """Occlusion labels (H, W) of the left view from its disparity and `mask0nocc.png`. Raises FormatError."""
-    disparity = read_disparity(disparity_left)
+    disparity, _ = drop_impossible(read_disparity(disparity_left))
     shown = read_png(mask)
     not_visible = ((shown if shown.ndim == 2 else shown[..., 0]) != _SHOWN_BY_BOTH) & ~np.isnan(disparity)
     return occlusion_from_mask(disparity, not_visible)

@@ -2,9 +2,9 @@
 `frames_finalpass` beside `disparity`.
 
 The disparities of both views are PFM files in pixels. Most files are positive. Some are negative throughout (right
-views of Driving, the subset for DispNet and FlowNet 2.0), so a file whose median is negative is negated. A value that
-is still negative then, or larger than the image is wide, is an error of the set (FlyingThings3D has such frames) and
-becomes NaN. Occlusion is derived from both disparities.
+views of Driving, the subset for DispNet and FlowNet 2.0), so a file whose median is negative is negated. Values that
+are still negative then, or larger than the image is wide, are errors of the set (FlyingThings3D has such frames), and
+missing as in every set. Occlusion is derived from both disparities.
 
 A scene of FlyingThings3D is a folder of frames. Driving is one street, seen with two lenses, in two directions and at
 two speeds. Monkaa's folders show eight worlds, most of them more than once: `eating_x2` and `eating_camera2_x2`.
@@ -34,16 +34,10 @@ _VARIANT = re.compile(r"(_(camera2|naked|augmented\d|difftex\d?|winter))*_x2$")
 
 
 def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a SceneFlow disparity: (H, W) float32 px, positive, NaN where invalid.
-
-    Raises FormatError for a file that is none.
-    """
+    """Read a SceneFlow disparity: (H, W) float32 px, positive. Raises FormatError for a file that is none."""
     disparity = read_pfm_disparity(path)
-    if np.nanmedian(disparity) < 0:
-        disparity = -disparity
-    impossible = ~((disparity >= 0) & (disparity <= disparity.shape[1]))
-    disparity[impossible] = np.nan
-    return disparity
+    known = disparity[np.isfinite(disparity)]
+    return -disparity if known.size and np.median(known) < 0 else disparity
 
 
 def _flying_things(root: Path, images: str) -> bool:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from pathlib import Path
 from typing import Any, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from datagen.errors import DatasetError
+from datagen.formats.impossible_disparity import GROUND_TRUTH_NOISE_PX, ImpossibleShare, drop_impossible
 from datagen.ground_truth.from_disparity import derive_gradient, derive_occlusion
 
 Picture = NDArray[np.uint8]
@@ -56,6 +58,10 @@ class StereoFrame(Protocol):
         """(H, W) pixels, x_left = x_right + d; None if the set has none."""
 
     @property
+    def impossible_left(self) -> ImpossibleShare:
+        """How many of the left view's disparities cannot be; they are NaN in `disparity_left`."""
+
+    @property
     def gradient_left(self) -> NDArray[np.float32]:
         """(H, W, 2) forward differences [dx, dy], 0 where there is none."""
 
@@ -84,8 +90,9 @@ class FileFrame:
     """A `StereoFrame` of somebody else's data set: how each of its arrays is read, None for what the set lacks.
 
     Gradients are derived from the disparity. Occlusion is the set's own if `read_occlusion_left` is given, derived
-    from both disparities if the set has both, and otherwise unknown. An array is read once and kept; DatasetError is
-    raised for one that does not have the size of the left image.
+    from both disparities if the set has both, and otherwise unknown. Disparities that cannot be become NaN, by the rule
+    of `datagen.formats.impossible_disparity`. An array is read once and kept; DatasetError is raised for one that does
+    not have the size of the left image.
     """
 
     name: str
@@ -97,6 +104,8 @@ class FileFrame:
     read_occlusion_left: Callable[[], NDArray[np.uint8]] | None = None
     read_object_index_left: Callable[[], NDArray[np.uint16]] | None = None
     read_foreground_left: Callable[[], NDArray[np.uint16]] | None = None
+    disparity_noise_px: float = GROUND_TRUTH_NOISE_PX
+    """Disparities that are negative by more than this are none."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -114,17 +123,30 @@ class FileFrame:
         """(H, W, 3) uint8 sRGB."""
         return self._checked("right image", self.read_right())
 
-    @cached_property
+    @property
     def disparity_left(self) -> DisparityMap:
         """(H, W) float32 px; NaN invalid, 0 infinitely far."""
-        return self._checked("left disparity", self.read_disparity_left())
+        return self._disparity_left[0]
+
+    @property
+    def impossible_left(self) -> ImpossibleShare:
+        """How many of the left view's disparities cannot be; they are NaN in `disparity_left`."""
+        return self._disparity_left[1]
 
     @cached_property
     def disparity_right(self) -> DisparityMap | None:
         """(H, W) float32 px; None if the set has none."""
         if self.read_disparity_right is None:
             return None
-        return self._checked("right disparity", self.read_disparity_right())
+        disparity = self._checked("right disparity", self.read_disparity_right())
+        return drop_impossible(disparity, self.disparity_noise_px)[0]
+
+    @property
+    def disparity_file(self) -> Path | None:
+        """The file of the left disparity; None where it is a part of another one."""
+        read = self.read_disparity_left
+        paths = [value for value in read.args if isinstance(value, Path)] if isinstance(read, partial) else []
+        return paths[0] if paths else None
 
     @property
     def gradient_left(self) -> NDArray[np.float32]:
@@ -158,6 +180,11 @@ class FileFrame:
         if self.read_foreground_left is None:
             return None
         return self._checked("foreground", self.read_foreground_left())
+
+    @cached_property
+    def _disparity_left(self) -> tuple[DisparityMap, ImpossibleShare]:
+        disparity = self._checked("left disparity", self.read_disparity_left())
+        return drop_impossible(disparity, self.disparity_noise_px)
 
     @cached_property
     def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

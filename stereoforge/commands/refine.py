@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import shown
-from stereoforge.inputs.images import read_color_image
+from stereoforge.inputs.images import read_color_images
 from stereoforge.progress import console
 
 if TYPE_CHECKING:
@@ -53,8 +53,8 @@ class Refine:
     """Run folder with a regressor, a confnet and a gradnet; for another predictor's disparity, a confnet_free and a
     gradnet_free."""
     disparity: Annotated[Path | None, shown("FILE", "none")] = None
-    """Disparity of the left view in pixels to refine instead of predicting one: PFM (NaN, infinite or negative where
-    there is none) or 16-bit PNG as KITTI has it (value / 256, 0 where there is none)."""
+    """Disparity of the left view in pixels to refine instead of predicting one: PFM (NaN, infinite, negative or
+    wider than the picture where there is none) or 16-bit PNG as KITTI has it (value / 256, 0 where there is none)."""
     disparity_right: Annotated[Path | None, shown("FILE", "matched by SGBM")] = None
     """Disparity of the right view, which tells how far to trust the left one's."""
     predictor: Literal["networks", "sgbm"] = "networks"
@@ -73,15 +73,20 @@ class Refine:
     def run(self) -> None:
         """Refine the pair and write every output into the folder."""
         self._check()
-        left, right = read_color_image(self.left), read_color_image(self.right)
+        left, right, remarks = read_color_images(self.left, self.right)
         from stereoforge.inputs.disparity_files import read_disparity
         from stereoforge.pipelines.prediction import open_settings, predict_pair
 
         given = None
         if self.disparity is not None:
             size = (left.shape[0], left.shape[1])
-            other = None if self.disparity_right is None else read_disparity(self.disparity_right, size)
-            given = read_disparity(self.disparity, size), other
+            disparity, said = read_disparity(self.disparity, size)
+            other = None
+            remarks += said
+            if self.disparity_right is not None:
+                other, said = read_disparity(self.disparity_right, size)
+                remarks += said
+            given = disparity, other
         predictor: Literal["networks", "sgbm"] = "sgbm" if given is not None else self.predictor
         settings = open_settings(self.parameters, self.weights, predictor)
         method = settings.ours
@@ -99,7 +104,13 @@ class Refine:
             )
         self._write(left, prediction, solution, deviation)
         doubts = _doubts(None if given is None else given[0], prediction.confidence)
-        for note in (*notes, *doubts, *_doubtful_views(left, right), *_doubtful_result(solution.disparity)):
+        for note in (
+            *remarks,
+            *notes,
+            *doubts,
+            *_doubtful_views(left, right),
+            *_doubtful_result(solution.disparity),
+        ):
             console.print(note, markup=False)
         console.print(
             f"{self.out}: disparity {solution.disparity.min():.1f} to {solution.disparity.max():.1f} px, refined in "

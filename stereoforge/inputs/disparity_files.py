@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.formats import read_pfm_disparity
+from datagen.formats.impossible_disparity import PREDICTION_NOISE_PX, drop_impossible
 from datagen.sources.kitti import read_disparity as read_kitti
 from stereoforge.errors import CommandError
 
@@ -15,10 +16,15 @@ READERS = {".pfm": read_pfm_disparity, ".png": read_kitti}
 """By the file's ending."""
 
 
-def read_disparity(path: Path, size: tuple[int, int]) -> NDArray[np.float32]:
-    """(H, W) pixels of a PFM, or of a 16-bit PNG as KITTI has it (value / 256, 0 for none).
+MOSTLY = 0.5
+"""From this share of impossible values on, the disparity is probably meant otherwise."""
 
-    NaN, infinite and negative values all mean that there is none, and become NaN; a 0 in a PFM is infinitely far.
+
+def read_disparity(path: Path, size: tuple[int, int]) -> tuple[NDArray[np.float32], list[str]]:
+    """(H, W) pixels of a PFM, or of a 16-bit PNG as KITTI has it (value / 256, 0 for none), and remarks about it.
+
+    Where there is none the array is NaN: what is not finite, larger than the picture is wide, or negative by more than
+    noise. A 0 in a PFM is infinitely far.
 
     Args:
         size: (height, width) it must have.
@@ -35,7 +41,9 @@ def read_disparity(path: Path, size: tuple[int, int]) -> NDArray[np.float32]:
     if disparity.shape != size:
         got = "x".join(map(str, disparity.shape[1::-1]))
         raise CommandError(f"{path}: is {got}, the pictures are {size[1]}x{size[0]}")
-    disparity = np.where(np.isfinite(disparity) & (disparity >= 0), disparity, np.nan).astype(np.float32)
+    disparity, impossible = drop_impossible(disparity, PREDICTION_NOISE_PX)
+    sign = "; is the sign the other way round?" if impossible.negative > MOSTLY else ""
     if np.isnan(disparity).all():
-        raise CommandError(f"{path}: holds no disparity, every pixel is marked as having none")
-    return disparity
+        reason = str(impossible) if impossible else "every pixel is marked as having none"
+        raise CommandError(f"{path}: holds no disparity, {reason}{sign}")
+    return disparity, [f"{path}: {impossible}{sign}"] if impossible else []

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from datagen.sources.ground_truth import require_ground_truth
 from datagen.sources.registry import open_source
 from datagen.sources.stereo_frame import StereoFrame
 from refine.forest import Forest, save_forest
@@ -43,13 +44,14 @@ def train_forest(
 
     Raises:
         CommandError: The folder has a forest already, or there is nothing to learn.
-        DatasetError, TrainingError: Anything wrong with the data sets, or with the regressor.
+        DatasetError, TrainingError: Anything wrong with the data sets, such as no ground truth, or the regressor.
     """
     file = forest_file(out)
     if file.exists():
         raise CommandError(f"{file}: is there already; choose another folder or remove it")
     samples = [sample for text in data for sample in open_source(text).frames("train")]
     chosen = np.unique(np.linspace(0, len(samples) - 1, min(plan.frames, len(samples))).round().astype(int))
+    require_ground_truth(", ".join(data), [samples[i] for i in chosen])
     predictor = StereoPredictor(out, device)
     with progress_bar() as progress:
         frames = progress.track(chosen, description="predicting for the forest")

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from datagen.sources.ground_truth import require_ground_truth
 from datagen.sources.registry import DataSource
 from refine.evaluation.evaluate import EvaluationFrame
 from refine.evaluation.settings import Settings, read_settings, write_settings
@@ -108,7 +109,7 @@ def validation_frames(
 
     Raises:
         CommandError: If a data set has no splits, and it is not said which part of it to validate on.
-        DatasetError: If a data set has splits, but none for validation.
+        DatasetError: If a data set has splits, but none for validation, or if no frame has ground truth.
     """
     for source in sources:
         if not source.format.splits and source.selection is None:
@@ -118,6 +119,7 @@ def validation_frames(
             )
     samples = [sample for source in sources for sample in source.frames(VALIDATION)]
     chosen = np.unique(np.linspace(0, len(samples) - 1, min(count, len(samples))).round().astype(int))
+    require_ground_truth(", ".join(source.location for source in sources), [samples[i] for i in chosen])
     with progress_bar() as progress:
         return [predictors.frame(samples[i]) for i in progress.track(chosen, description="predicting")]
 

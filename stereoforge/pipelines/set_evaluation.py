@@ -8,6 +8,8 @@ from pathlib import Path
 
 from datagen import StereoSample
 from datagen.dataset.manifest import read_manifest
+from datagen.formats.impossible_disparity import ImpossibleShare
+from datagen.sources.ground_truth import mean_share, require_ground_truth
 from datagen.sources.registry import open_source
 from datagen.sources.stereo_frame import StereoFrame
 from datagen.sources.webdataset import ShardFrames
@@ -17,7 +19,7 @@ from refine.evaluation.settings import Settings
 from refine.method import Method
 from refine.report.write import ReportContext, ReportFiles, write_report
 from stereoforge.pipelines.prediction import Predictors
-from stereoforge.progress import progress_bar
+from stereoforge.progress import console, progress_bar
 from training.presets import TASKS
 from training.runs.weights import has_weights, read_summary
 
@@ -41,7 +43,9 @@ class TestData:
 
 
 def open_test_data(sources: Sequence[str], split: str) -> list[TestData]:
-    """Open data sets as `datagen.sources.registry` takes them; raises DatasetError, naming what is wrong.
+    """Open data sets as `datagen.sources.registry` takes them.
+
+    Raises DatasetError, naming what is wrong; a set without a single pixel of ground truth is.
 
     A set is called after its folder, or by all of its source where two folders have one name.
     """
@@ -50,6 +54,7 @@ def open_test_data(sources: Sequence[str], split: str) -> list[TestData]:
     opened = []
     for name, source in zip(names, sources, strict=True):
         frames = open_source(source).frames(split)
+        require_ground_truth(source, frames)
         family = family_of(source, frames)
         facts = {"Source": source, "Split": split} | ({"Family": family} if family else {})
         opened.append(TestData(name, frames, family, split, facts))
@@ -83,26 +88,36 @@ def evaluate_set(
     methods: tuple[Method, ...] = (),
     options: EvaluationOptions | None = None,
 ) -> EvaluatedSet:
-    """Run the networks and every method on every frame, showing progress."""
+    """Run the networks and every method on every frame, showing progress, and say how much ground truth cannot be."""
+    shares: list[ImpossibleShare] = []
     with progress_bar() as progress:
         what = f"evaluating on {data.name}"
         task = progress.add_task(f"{what} (compiling, after an install)", total=len(data.frames))
         evaluation = evaluate(
-            _predicted(data.frames, predictors),
+            _predicted(data.frames, predictors, shares),
             methods,
             options or evaluation_options(data.family),
             progress=lambda done, _: progress.update(task, completed=done, description=what),
         )
-    return EvaluatedSet(data.name, evaluation, data.family, data.split, data.facts)
+    facts = dict(data.facts)
+    if impossible := mean_share(shares):
+        facts["Ground truth"] = str(impossible)
+        console.print(f"{data.name}: {impossible}", markup=False, soft_wrap=True)
+    return EvaluatedSet(data.name, evaluation, data.family, data.split, facts)
 
 
-def _predicted(frames: Sequence[StereoFrame], predictors: Predictors) -> Iterator[EvaluationFrame]:
-    """Every frame with its predictions. The first one's are made twice: what a first run compiles and allocates is not
-    the predictors' time."""
+def _predicted(
+    frames: Sequence[StereoFrame], predictors: Predictors, shares: list[ImpossibleShare]
+) -> Iterator[EvaluationFrame]:
+    """Every frame with its predictions; `shares` receives how much of its ground truth cannot be.
+
+    The first one's are made twice: what a first run compiles and allocates is not the predictors' time.
+    """
     for order, frame in enumerate(frames):
         if order == 0:
             predictors.frame(frame)
         yield predictors.frame(frame)
+        shares.append(frame.impossible_left)
 
 
 def report_evaluation(

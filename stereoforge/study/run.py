@@ -15,6 +15,7 @@ from pathlib import Path
 from datagen import Recipe
 from datagen.dataset.samples import open_layout
 from datagen.errors import DatasetError
+from datagen.sources.ground_truth import require_ground_truth
 from datagen.sources.registry import open_source
 from refine.evaluation.archive import read_evaluation, write_evaluation
 from refine.evaluation.evaluate import EvaluationOptions
@@ -360,6 +361,7 @@ class _Study:
 
         def evaluate(folder: Path) -> None:
             frames = open_source(data.source).frames("test")
+            require_ground_truth(data.source, frames)
             family = family_of(data.source, frames)
             facts = {"Source": data.source, "Networks": run.folder.name}
             rows = open_settings(None, run.folder).rows(methods)

@@ -17,19 +17,46 @@ NAN = np.nan
 
 def test_markers_of_no_disparity_become_nan(tmp_path: Path) -> None:
     write_pfm(tmp_path / "a.pfm", np.array([[1.5, np.inf, NAN], [-np.inf, -3.0, 0.0]], np.float32))
-    np.testing.assert_array_equal(
-        read_disparity(tmp_path / "a.pfm", (2, 3)), [[1.5, NAN, NAN], [NAN, NAN, 0]]
-    )
+    disparity, remarks = read_disparity(tmp_path / "a.pfm", (2, 3))
+    np.testing.assert_array_equal(disparity, [[1.5, NAN, NAN], [NAN, NAN, 0]])
+    assert remarks == [
+        f"{tmp_path / 'a.pfm'}: 33.33% of the disparities cannot be and are left out (33.33% negative)"
+    ]
     write_png(tmp_path / "b.png", np.array([[0, 256, 384], [65535, 1, 0]], np.uint16))
-    np.testing.assert_array_equal(
-        read_disparity(tmp_path / "b.png", (2, 3)), [[NAN, 1, 1.5], [65535 / 256, 1 / 256, NAN]]
-    )
+    disparity, _ = read_disparity(tmp_path / "b.png", (2, 3))
+    np.testing.assert_array_equal(disparity, [[NAN, 1, 1.5], [NAN, 1 / 256, NAN]])
+
+
+@pytest.mark.parametrize("sentinel", [65535.0, 1e30, -999.0])
+def test_sentinels_are_no_disparity(tmp_path: Path, sentinel: float) -> None:
+    expected = np.full((90, 160), 12.5, np.float32)
+    expected[:4, :4], expected[:, -10:] = NAN, NAN
+    write_pfm(tmp_path / "a.pfm", np.where(np.isnan(expected), sentinel, expected))
+    disparity, (remark,) = read_disparity(tmp_path / "a.pfm", (90, 160))
+    np.testing.assert_array_equal(disparity, expected)
+    assert "6.36% of the disparities cannot be" in remark
+
+
+def test_little_below_zero_is_noise(tmp_path: Path) -> None:
+    write_pfm(tmp_path / "a.pfm", np.array([[-0.9, 2.0, -0.1]], np.float32))
+    disparity, remarks = read_disparity(tmp_path / "a.pfm", (1, 3))
+    np.testing.assert_array_equal(disparity, np.array([[0, 2, 0]], np.float32))
+    assert remarks == []
+
+
+def test_the_other_sign_is_guessed(tmp_path: Path) -> None:
+    path = tmp_path / "a.pfm"
+    write_pfm(path, np.full((2, 3), -2.5, np.float32))
+    with pytest.raises(CommandError, match=r"holds no disparity, .*; is the sign the other way round\?"):
+        read_disparity(path, (2, 3))
+    write_pfm(path, np.array([[-2.5, -2.5, 1]], np.float32))
+    assert read_disparity(path, (1, 3))[1][0].endswith("is the sign the other way round?")
 
 
 def test_three_channels_that_are_alike_are_one(tmp_path: Path) -> None:
-    disparity = np.array([[1.5, NAN, 2], [3, 4, 5]], np.float32)
+    disparity = np.array([[1.5, NAN, 2], [3, 1, 0]], np.float32)
     write_pfm(tmp_path / "a.PFM", np.repeat(disparity[..., None], 3, axis=2))
-    np.testing.assert_array_equal(read_disparity(tmp_path / "a.PFM", (2, 3)), disparity)
+    np.testing.assert_array_equal(read_disparity(tmp_path / "a.PFM", (2, 3))[0], disparity)
 
 
 def test_other_files_are_refused_by_name(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from datagen.formats import write_pfm
 from stereoforge.errors import CommandError
-from stereoforge.inputs.images import read_color_image
+from stereoforge.inputs.images import read_color_images
 
 COLORS = np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8)
 
@@ -20,12 +20,16 @@ def test_grey_deep_and_transparent_pictures_become_8_bit_colour(tmp_path: Path) 
     for pixels, expected in (
         (COLORS, COLORS),
         (COLORS[..., 0], np.repeat(COLORS[..., :1], 3, axis=2)),
-        (np.dstack([COLORS, COLORS[..., :1]]), COLORS),
+        (np.dstack([COLORS, np.full_like(COLORS[..., :1], 255)]), COLORS),
+        (np.dstack([COLORS, np.zeros_like(COLORS[..., :1])]), np.full_like(COLORS, 255)),
         (COLORS[..., 0].astype(np.uint16) * 257, np.repeat(COLORS[..., :1], 3, axis=2)),
         (COLORS[..., 0] > 127, np.where(COLORS[..., :1] > 127, 255, 0).repeat(3, axis=2)),
     ):
         iio.imwrite(path, pixels)
-        np.testing.assert_array_equal(read_color_image(path), expected)
+        left, right, remarks = read_color_images(path, path)
+        np.testing.assert_array_equal(left, expected)
+        np.testing.assert_array_equal(right, expected)
+        assert remarks == []
 
 
 def test_what_is_no_picture_is_said_without_the_decoder_s_words(tmp_path: Path) -> None:
@@ -42,7 +46,7 @@ def test_what_is_no_picture_is_said_without_the_decoder_s_words(tmp_path: Path) 
     for name, sentence in (
         ("text.png", unreadable),
         ("empty.png", unreadable),
-        ("cut.png", unreadable),
+        ("cut.png", "is a PNG file cut off after 500 bytes"),
         ("folder.png", "is a folder, not a picture"),
         ("gone.png", "there is no such file"),
         ("moving.gif", "holds 2 pictures; one is needed"),
@@ -50,5 +54,5 @@ def test_what_is_no_picture_is_said_without_the_decoder_s_words(tmp_path: Path) 
         ("map.pfm", "is a map of numbers, not a picture; a disparity is given with --disparity"),
     ):
         with pytest.raises(CommandError) as refusal:
-            read_color_image(tmp_path / name)
+            read_color_images(whole, tmp_path / name)
         assert str(refusal.value) == f"{tmp_path / name}: {sentence}"

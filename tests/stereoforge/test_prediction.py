@@ -58,7 +58,9 @@ class Constant:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr("stereoforge.prediction.time", SimpleNamespace(perf_counter=lambda: clock.now))
+    monkeypatch.setattr(
+        "stereoforge.pipelines.prediction.time", SimpleNamespace(perf_counter=lambda: clock.now)
+    )
     return clock
 
 

@@ -94,7 +94,8 @@ def test_methods_without_inputs_or_parameters_are_left_out(tmp_path):
 
 def test_a_set_without_a_validation_split_is_refused():
     """One that belongs to every split at once needs its frames named; one with splits needs a `val` among them."""
-    unsplit = SourceFormat("flat", "a flat set", lambda _: True, lambda *_: [SimpleNamespace()] * 3)
+    sample = SimpleNamespace(disparity_left=np.ones((2, 3), np.float32))
+    unsplit = SourceFormat("flat", "a flat set", lambda _: True, lambda *_: [sample] * 3)
     with pytest.raises(CommandError, match=r"sets/flat: has no validation split.*sets/flat#0-19"):
         validation_frames([DataSource(unsplit, "sets/flat")], None, 5)
     tested = SourceFormat(

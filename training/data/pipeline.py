@@ -18,6 +18,8 @@ import torch
 from numpy.typing import NDArray
 from torch.utils.data import DataLoader, Dataset
 
+from datagen.formats.impossible_disparity import ImpossibleShare
+from datagen.sources.ground_truth import mean_share
 from datagen.sources.registry import open_source
 from datagen.sources.stereo_frame import StereoFrame
 from datagen.sources.webdataset import ShardFrames
@@ -64,8 +66,11 @@ class PairCache:
     def __init__(self, sources: Sequence[Source], capacity_bytes: int = DEFAULT_CACHE_BYTES) -> None:
         self._sources = sources
         self._pairs: dict[tuple[int, int], StereoPair] = {}
+        self._shares: list[list[ImpossibleShare]] = [[] for _ in sources]
         for key in self._interleaved():
-            pair = read_pair(sources[key[0]].frames[key[1]])
+            frame = sources[key[0]].frames[key[1]]
+            pair = read_pair(frame)
+            self._shares[key[0]].append(frame.impossible_left)
             capacity_bytes -= pair.nbytes
             if capacity_bytes < 0:
                 break
@@ -78,6 +83,10 @@ class PairCache:
         """The pair of the index (source, frame), from memory or decoded."""
         pair = self._pairs.get(key)
         return read_pair(self._sources[key[0]].frames[key[1]]) if pair is None else pair
+
+    def impossible_shares(self) -> list[ImpossibleShare]:
+        """How much of each source's ground truth cannot be, over the frames that were decoded for the memory."""
+        return [mean_share(shares) for shares in self._shares]
 
     def name(self, source: int, frame: int) -> str:
         """The name of a frame, for messages."""
@@ -250,6 +259,10 @@ class StereoDataModule(pl.LightningDataModule):
         self._cache = PairCache(sources, cache_bytes)
         spread = np.linspace(0, len(validation) - 1, min(sampling.validation_samples, len(validation)))
         self._validation = FrameDataset([validation[round(i)] for i in spread])
+
+    def impossible_shares(self) -> list[ImpossibleShare]:
+        """How much of each source's ground truth cannot be (`PairCache.impossible_shares`)."""
+        return self._cache.impossible_shares()
 
     def image_mean(self) -> NDArray[np.float32]:
         """Mean colour (3,) in 0..1 of both views of the first frames of all sources."""

@@ -12,10 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import overload
 
-import numpy as np
-from numpy.typing import NDArray
-
 from datagen.formats import read_pfm_disparity
+from datagen.formats.impossible_disparity import PREDICTION_NOISE_PX
 from datagen.sources.kitti import read_disparity as read_kitti_disparity
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
 from training.data.pipeline import Source
@@ -39,8 +37,8 @@ class PseudoLabelFrames(Sequence[StereoFrame]):
     """The frames of a data set, with the disparities of a folder as ground truth of their left views.
 
     A frame `a/b` takes `a/b.pfm` of the folder (in pixels; infinity or NaN where unknown) or `a/b.png` (as KITTI has
-    it: 16 bits, 256 times the disparity, 0 where unknown). The right view then has no ground truth, and occlusion is
-    unknown.
+    it: 16 bits, 256 times the disparity, 0 where unknown). Disparities that cannot be become NaN. The right view then
+    has no ground truth, and occlusion is unknown.
     """
 
     def __init__(self, frames: Sequence[StereoFrame], folder: Path) -> None:
@@ -70,7 +68,8 @@ class PseudoLabelFrames(Sequence[StereoFrame]):
             scene_name=frame.scene_name,
             read_left=partial(getattr, frame, "left"),
             read_right=partial(getattr, frame, "right"),
-            read_disparity_left=partial(_read, self._files[index]),
+            read_disparity_left=partial(_READERS[self._files[index].suffix.lower()], self._files[index]),
+            disparity_noise_px=PREDICTION_NOISE_PX,
         )
 
 
@@ -82,9 +81,3 @@ def _file_of(folder: Path, name: str) -> Path:
     raise TrainingError(
         f"{folder}: has no disparity for the frame {name} (neither {name}.pfm nor {name}.png)"
     )
-
-
-def _read(path: Path) -> NDArray[np.float32]:
-    disparity = _READERS[path.suffix.lower()](path)
-    disparity[~np.isfinite(disparity)] = np.nan
-    return disparity

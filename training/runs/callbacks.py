@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytorch_lightning as pl
@@ -52,9 +52,15 @@ class BestWeights(pl.Callback):
 
 
 class RunProgress(pl.Callback):
-    """A bar over the whole run with the time left, and a line for every validation."""
+    """A bar over the whole run with the time left, and a line for every validation.
 
-    def __init__(self, title: str) -> None:
+    Args:
+        title: Of the bar.
+        remarks: Sentences to print before the first step.
+    """
+
+    def __init__(self, title: str, remarks: Sequence[str] = ()) -> None:
+        self._remarks = remarks
         self._console = Console(stderr=True)
         self._progress = JobProgress(self._console, "loss {task.fields[loss]:.3f}", transient=True)
         self._title = title
@@ -63,6 +69,8 @@ class RunProgress(pl.Callback):
         """Show the bar, at the steps that a resumed run has done."""
         if not trainer.is_global_zero:
             self._console.quiet = True
+        for remark in self._remarks:
+            self._console.print(remark, markup=False, highlight=False, soft_wrap=True)
         self._bar = self._progress.add_task(
             self._title, total=trainer.max_steps, completed=trainer.global_step, loss=math.nan
         )

@@ -13,6 +13,7 @@ import pytorch_lightning as pl
 import torch
 from pytorch_lightning.loggers import TensorBoardLogger
 
+from datagen.sources.ground_truth import require_ground_truth
 from datagen.sources.stereo_frame import StereoFrame
 from training.data.pipeline import Source, StereoDataModule, open_sources
 from training.data.pseudo_labels import with_pseudo_labels
@@ -54,18 +55,21 @@ def train(request: TrainingRequest) -> TrainingSummary:
         )
         torch.manual_seed(request.seed)
         built = build_task(plan, module)
-        trainer = _trainer(plan, _callbacks(plan, built, _summary_of(plan, sources)))
+        trainer = _trainer(plan, _callbacks(plan, built, _summary_of(plan, sources), _remarks(plan, module)))
         trainer.fit(built.task, module, ckpt_path=checkpoint, weights_only=True)
         trainer.strategy.barrier()  # the first process writes what the others read now
     return read_summary(request.out, written_networks(request.task)[0])
 
 
 def _open_data(plan: RunPlan) -> tuple[list[Source], list[StereoFrame]]:
-    """The data sets to train on and the frames to validate on."""
+    """The data sets to train on and the frames to validate on, both with ground truth."""
     request, crop = plan.request, (plan.preset.crop_height, plan.preset.crop_width)
     sources, held_out = open_sources(request.data, crop, request.validation)
     if request.pseudo_labels is not None:
         sources = [with_pseudo_labels(sources, request.pseudo_labels)]
+    for (location, _), source in zip(request.data, sources, strict=True):
+        require_ground_truth(str(location), source.frames)
+    require_ground_truth(", ".join(map(str, request.validation or (d for d, _ in request.data))), held_out)
     return sources, held_out
 
 
@@ -82,10 +86,18 @@ def _summary_of(plan: RunPlan, sources: Sequence[Source]) -> TrainingSummary:
     )
 
 
-def _callbacks(plan: RunPlan, built: BuiltTask, summary: TrainingSummary) -> list[pl.Callback]:
+def _remarks(plan: RunPlan, module: StereoDataModule) -> list[str]:
+    """What is worth saying about the data sets before the run begins."""
+    shares = zip(plan.request.data, module.impossible_shares(), strict=True)
+    return [f"{location}: {share}" for (location, _), share in shares if share]
+
+
+def _callbacks(
+    plan: RunPlan, built: BuiltTask, summary: TrainingSummary, remarks: Sequence[str]
+) -> list[pl.Callback]:
     callbacks = [BestWeights(_saver(plan, built, summary)), last_checkpoint(plan.logs / CHECKPOINT)]
     if plan.request.progress:
-        callbacks.append(RunProgress(f"{plan.request.task} ({plan.preset_name})"))
+        callbacks.append(RunProgress(f"{plan.request.task} ({plan.preset_name})", remarks))
     return callbacks
 
 
