@@ -4,7 +4,8 @@
 The disparities of both views are PFM files in pixels. Most files are positive. Some are negative throughout (right
 views of Driving, the subset for DispNet and FlowNet 2.0), so a file whose median is negative is negated. Values that
 are still negative then, or larger than the image is wide, are errors of the set (FlyingThings3D has such frames), and
-missing as in every set. Occlusion is derived from both disparities.
+missing as in every set. Occlusion is derived from both disparities. The pictures are PNG files, or WebP files as they
+can be downloaded too (`frames_cleanpass_webp`).
 
 A scene of FlyingThings3D is a folder of frames. Driving is one street, seen with two lenses, in two directions and at
 two speeds. Monkaa's folders show eight worlds, most of them more than once: `eating_x2` and `eating_camera2_x2`.
@@ -13,7 +14,7 @@ two speeds. Monkaa's folders show eight worlds, most of them more than once: `ea
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -27,6 +28,8 @@ from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 from stereoforge_kit.files import matching
 
 PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
+_IN_WEBP = "_webp"
+"""What the folder of a pass's WebP pictures has behind its name."""
 PARTS = {"train": "TRAIN", "test": "TEST"}
 """FlyingThings3D's own splits."""
 _VARIANT = re.compile(r"(_(camera2|naked|augmented\d|difftex\d?|winter))*_x2$")
@@ -54,10 +57,32 @@ def _monkaa(root: Path, images: str) -> bool:
     return bool(matching(root, f"{images}/*/left"))
 
 
-def _recognises(root: Path, render_pass: str, has_images: Callable[[Path, str], bool]) -> bool:
+def recognises_pass(
+    root: Path, passes: Mapping[str, str], render_pass: str, has_images: Callable[[Path, str], bool]
+) -> bool:
     """Whether the folder has a pass's images; those of the final pass count where there are no clean ones."""
-    passes = [name for name, images in PASSES.items() if has_images(root, images)]
-    return passes[:1] == [render_pass]
+    found = [
+        name
+        for name, images in passes.items()
+        if has_images(root, images) or has_images(root, f"{images}{_IN_WEBP}")
+    ]
+    return found[:1] == [render_pass]
+
+
+def picture_file(folder: Path, stem: str) -> Path:
+    """A picture's PNG file or, where there is none, its WebP file, also in the folders that the download has for those.
+
+    `folder` is that of one view of a frame's pictures, such as `frames_cleanpass/TRAIN/A/0000/left`.
+    """
+    path = folder / f"{stem}.png"
+    others = (path.with_suffix(".webp"), _webp_folder(path).with_suffix(".webp"))
+    return path if path.is_file() else next((other for other in others if other.is_file()), path)
+
+
+def _webp_folder(path: Path) -> Path:
+    """The path below the pass's WebP folder."""
+    names = {*PASSES.values(), "image_clean", "image_final"}
+    return Path(*(f"{part}{_IN_WEBP}" if part in names else part for part in path.parts))
 
 
 def _find(
@@ -74,8 +99,8 @@ def _frames(images: Path, truths: Path, pattern: str, scene_of: Callable[[str], 
         yield FileFrame(
             name=f"{scene.as_posix()}/{truth.stem}",
             scene_name=scene_of(scene.as_posix()),
-            read_left=partial(read_picture, images / scene / "left" / f"{truth.stem}.png"),
-            read_right=partial(read_picture, images / scene / "right" / f"{truth.stem}.png"),
+            read_left=partial(read_picture, picture_file(images / scene / "left", truth.stem)),
+            read_right=partial(read_picture, picture_file(images / scene / "right", truth.stem)),
             read_disparity_left=partial(read_disparity, truth),
             read_disparity_right=partial(read_disparity, truths / scene / "right" / truth.name),
         )
@@ -93,7 +118,7 @@ def _formats() -> Iterator[SourceFormat]:
             yield SourceFormat(
                 f"{name}-final" if final else name,
                 f"{title} (final pass)" if final else title,
-                partial(_recognises, render_pass=render_pass, has_images=has_images),
+                partial(recognises_pass, passes=PASSES, render_pass=render_pass, has_images=has_images),
                 partial(_find, render_pass=render_pass, pattern=pattern, scene_of=scene_of),
                 splits,
             )

@@ -29,24 +29,27 @@ class World:
     """Where labels derived from two disparity maps may err: within half a pixel of the square's edges."""
 
 
-def world(seed: int = 0) -> World:
+def world(seed: int = 0, units_per_px: int = 4) -> World:
+    """The disparities are multiples of 1 / `units_per_px`, quarters for all but one of the encodings."""
     rng = np.random.default_rng(seed)
     left, right = (rng.integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8) for _ in range(2))
-    rows = (
-        np.arange(HEIGHT, dtype=np.float32)[:, None] / 4
-    )  # exact in every encoding, the quarter pixels of Middlebury 2003 too
+    rows = np.arange(HEIGHT, dtype=np.float32)[:, None] / 4
     disparity_left = np.broadcast_to(2.25 + rows, (HEIGHT, WIDTH)).astype(np.float32)
+    disparity_left = np.rint(disparity_left * units_per_px) / np.float32(units_per_px)
     disparity_right = disparity_left.copy()
-    disparity_left[4:8, 20:30] = 10.5
-    disparity_right[4:8, 10:19] = 10.5
-    # Hidden: what of the background falls on the square in the right view, which spans 9.5 to 19.5 there.
-    x_right = np.arange(WIDTH) + 0.5 - disparity_left
+    nearest = np.float32(np.rint(10.5 * units_per_px)) / np.float32(units_per_px)
+    first, last = 20 - nearest, 30 - nearest  # Where the square begins and ends in the right view.
+    centers = np.arange(WIDTH) + 0.5
+    disparity_left[4:8, 20:30] = nearest
+    disparity_right[4:8, (centers > first) & (centers < last)] = nearest
+    # Hidden: what of the background falls on the square in the right view.
+    x_right = centers - disparity_left
     occlusion = np.zeros((HEIGHT, WIDTH), np.uint8)
     background = disparity_left < 10
-    occlusion[4:8] = np.where(background & (x_right > 9.5) & (x_right < 19.5), 1, 0)[4:8]
+    occlusion[4:8] = np.where(background & (x_right > first) & (x_right < last), 1, 0)[4:8]
     occlusion[x_right < 0] = 2
-    silhouette = background & (np.minimum(np.abs(x_right - 10), np.abs(x_right - 19)) <= 0.5)
-    return World(left, right, disparity_left, disparity_right, occlusion, silhouette)
+    edges = np.minimum(np.abs(x_right - first - 0.5), np.abs(x_right - last + 0.5))
+    return World(left, right, disparity_left, disparity_right, occlusion, background & (edges <= 0.5))
 
 
 def png(path: Path, array: NDArray[np.generic]) -> None:
@@ -90,6 +93,16 @@ def flyingthings3d(root: Path) -> World:
             png(root / folder / base / "right/0009.png", w.right if folder == "frames_cleanpass" else w.left)
         pfm(root / "disparity" / base / "left/0009.pfm", w.disparity_left)
         pfm(root / "disparity" / base / "right/0009.pfm", w.disparity_right)
+    return w
+
+
+def flyingthings3d_subset(root: Path) -> World:
+    """Flat folders, negative disparities."""
+    w = world()
+    for part in ("train", "val"):
+        for view, image, truth in (("left", w.left, w.disparity_left), ("right", w.right, w.disparity_right)):
+            png(root / part / "image_clean" / view / "0000017.png", image)
+            pfm(root / part / "disparity" / view / "0000017.pfm", -truth)
     return w
 
 
@@ -200,6 +213,19 @@ def middlebury2003(root: Path) -> World:
         code = np.rint(truth * 4).astype(np.uint8)
         code[0] = 0
         pgm(root / f"cones/{name}.pgm", code)
+    return w
+
+
+def middlebury2006(root: Path) -> World:
+    """Third size: grey values are three times the disparity, 0 is unknown."""
+    w = world(units_per_px=3)
+    scene = root / "ThirdSize/Aloe"
+    png(scene / "view1.png", w.left)
+    png(scene / "view5.png", w.right)
+    for name, truth in (("disp1", w.disparity_left), ("disp5", w.disparity_right)):
+        code = np.rint(truth * 3).astype(np.uint8)
+        code[0] = 0
+        png(scene / f"{name}.png", code)
     return w
 
 

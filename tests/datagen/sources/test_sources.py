@@ -8,6 +8,7 @@ from pathlib import Path
 import fsspec
 import numpy as np
 import pytest
+from PIL import Image
 
 from datagen import DatasetError
 from datagen.dataset.shards import CACHE_VARIABLE
@@ -19,16 +20,17 @@ from tests.datagen.sources import published
 from tests.datagen.sources.published import World, png, shard, shard_members, world
 
 SETS: dict[str, Callable[[Path], World]] = {
-    name: getattr(published, name)
+    name: getattr(published, name.replace("-", "_"))
     for name in (
-        "flyingthings3d", "driving", "monkaa", "sintel", "kitti2012", "kitti2015", "middlebury", "eth3d",
-        "middlebury2003", "crestereo", "webdataset",
+        "flyingthings3d", "flyingthings3d-subset", "driving", "monkaa", "sintel", "kitti2012", "kitti2015",
+        "middlebury", "eth3d", "middlebury2003", "middlebury2006", "crestereo", "webdataset",
     )
 }  # fmt: skip
 WITH_RIGHT_TRUTH = {
-    "flyingthings3d", "driving", "monkaa", "middlebury", "middlebury2003", "crestereo", "webdataset",
+    "flyingthings3d", "flyingthings3d-subset", "driving", "monkaa", "middlebury", "middlebury2003", "middlebury2006",
+    "crestereo", "webdataset",
 }  # fmt: skip
-DERIVED_LABELS = {"flyingthings3d", "driving", "monkaa", "middlebury2003", "crestereo"}
+DERIVED_LABELS = WITH_RIGHT_TRUTH - {"middlebury", "webdataset"}
 GREY = {"eth3d"}
 JPEG_TOLERANCE = 60
 """Of single pixels of noise, which JPEG hardly keeps."""
@@ -55,7 +57,7 @@ def test_frame(name: str, tmp_path: Path) -> None:
     assert frame.disparity_left.dtype == np.float32
     if name in WITH_RIGHT_TRUTH:
         right = w.disparity_right.copy()
-        if name == "middlebury2003":
+        if name in ("middlebury2003", "middlebury2006"):
             right[0] = np.nan
         np.testing.assert_array_equal(frame.disparity_right, right)
     else:
@@ -80,7 +82,7 @@ def holes(name: str, truth: np.ndarray) -> np.ndarray:
     truth = truth.copy()
     if name.startswith("kitti"):
         truth[::2] = np.nan
-    elif name in ("middlebury", "eth3d", "middlebury2003"):
+    elif name in ("middlebury", "eth3d", "middlebury2003", "middlebury2006"):
         truth[0] = np.nan
     return truth
 
@@ -98,6 +100,7 @@ def test_final_passes(tmp_path: Path) -> None:
 
 SCENES = {
     "flyingthings3d": "TRAIN/B/0017",
+    "flyingthings3d-subset": "train/0000017",
     "driving": "driving",
     "monkaa": "eating",
     "sintel": "alley_1",
@@ -106,6 +109,7 @@ SCENES = {
     "middlebury": "Adirondack",
     "eth3d": "delivery_area",
     "middlebury2003": "cones",
+    "middlebury2006": "Aloe",
     "crestereo": "tree/0a1b",
     "webdataset": "train-0000",
 }
@@ -213,6 +217,66 @@ def test_middlebury_2003_scales_go_with_the_resolution(width: int, scale: int, t
     truth = open_source(tmp_path).frames("test")[0].disparity_left
     assert np.isnan(truth[0]).all()
     assert (truth[1:] == 88 / scale).all()
+
+
+@pytest.mark.parametrize(
+    ("folder", "width", "scale"),
+    [
+        ("", 1240, 1),
+        ("", 690, 2),
+        ("", 413, 3),
+        ("FullSize", 60, 1),
+        ("HalfSize", 60, 2),
+        ("ThirdSize", 60, 3),
+    ],
+)
+def test_middlebury_2006_scales_go_with_the_size(folder: str, width: int, scale: int, tmp_path: Path) -> None:
+    code = np.full((4, width), 45, np.uint8)
+    code[0] = 0
+    scene = tmp_path / folder / "Art"
+    for name in ("view1", "view5"):
+        png(scene / f"{name}.png", np.zeros((4, width, 3), np.uint8))
+    png(scene / "disp1.png", code)
+    truth = open_source(tmp_path).frames("test")[0].disparity_left
+    assert np.isnan(truth[0]).all()
+    assert (truth[1:] == 45 / scale).all()
+
+
+def test_middlebury_2006_with_all_lights_and_exposures(tmp_path: Path) -> None:
+    published.middlebury2006(tmp_path)
+    scene = tmp_path / "ThirdSize/Aloe"
+    for light in ("Illum1/Exp0", "Illum3/Exp2"):
+        (scene / light).mkdir(parents=True)
+        for name in ("view1.png", "view5.png"):
+            shutil.copy(scene / name, scene / light)
+    for name in ("view1.png", "view5.png"):
+        (scene / name).unlink()
+    frames = open_source(tmp_path).frames("test")
+    assert [(frame.name, frame.scene_name) for frame in frames] == [
+        ("ThirdSize/Aloe/Illum1/Exp0", "Aloe"),
+        ("ThirdSize/Aloe/Illum3/Exp2", "Aloe"),
+    ]
+    assert np.isfinite(frames[1].disparity_left).any()
+
+
+@pytest.mark.parametrize("folder", ["", "_webp"])
+@pytest.mark.parametrize("name", ["flyingthings3d", "flyingthings3d-subset", "driving", "monkaa"])
+def test_sceneflow_in_webp(name: str, folder: str, tmp_path: Path) -> None:
+    w = SETS[name](tmp_path)
+    for path in list(tmp_path.rglob("*.png")):
+        target = Path(
+            str(path).replace("pass/", f"pass{folder}/").replace("image_clean/", f"image_clean{folder}/")
+        )
+        target.parent.mkdir(parents=True, exist_ok=True)
+        Image.open(path).save(target.with_suffix(".webp"), lossless=True)
+        path.unlink()
+    for images in ("frames_cleanpass", "frames_finalpass", "train/image_clean", "val/image_clean"):
+        if folder:
+            shutil.rmtree(tmp_path / images, ignore_errors=True)
+    source = open_source(tmp_path)
+    assert source.format.name == name
+    np.testing.assert_array_equal(source.frames("train")[0].left, w.left)
+    np.testing.assert_array_equal(source.frames("train")[0].right, w.right)
 
 
 def test_kitti_tells_its_cars_from_the_background(tmp_path: Path) -> None:
@@ -325,7 +389,7 @@ def test_damaged_files_are_sentences(name: str, tmp_path: Path) -> None:
         path.write_bytes(whole[: len(whole) // 3])
         problem = problem_of(tmp_path)
         if problem is None:
-            untouched = ("disp_occ_1", "_11.png", "image_0", "final", "TEST", "obj_map")
+            untouched = ("disp_occ_1", "_11.png", "image_0", "final", "TEST", "obj_map", "/val/")
             assert any(part in str(path) for part in untouched), path
         else:
             assert path.name in problem
