@@ -192,6 +192,19 @@ class StereoSample:
         """The world that was rendered, with its camera."""
         return read_scene(self.intact(self.layout.scene_record(self.split, self.scene)))
 
+    @property
+    def evaluated_files(self) -> tuple[Path, ...]:
+        """The files that an evaluation on the left view reads: both images, its disparity and its occlusion."""
+        wanted: tuple[tuple[str, View], ...] = (
+            (self._image_kind, "left"),
+            (self._image_kind, "right"),
+            ("disparity", "left"),
+            ("occlusion", "left"),
+        )
+        return tuple(
+            self.layout.file(kind, self.split, self.scene, view, self.frame) for kind, view in wanted
+        )
+
     def intact(self, path: Path) -> Path:
         """Compare one of the scene's files with the manifest and return its path.
 

@@ -29,8 +29,7 @@ def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
 
 def _frames(root: Path) -> Iterator[FileFrame]:
     truths = root / f"{ETH3D_IMAGES}_gt"
-    for image in matching(root / ETH3D_IMAGES, "*/im0.png"):
-        scene = image.parent
+    for scene in dict.fromkeys(picture.parent for picture in matching(root / ETH3D_IMAGES, "*/im[01].png")):
         beside = truths / scene.name
         place = _PAIR.sub("", scene.name)
         frame = scene_frame(scene.name, place, scene, beside if beside.is_dir() else scene)

@@ -81,12 +81,12 @@ def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
 
 
 def _frames(root: Path) -> Iterator[FileFrame]:
-    for image in matching(root, ("im0.png", "*/im0.png", "*/*/im0.png")):
-        name = image.parent.relative_to(root).as_posix()
-        scene_name = _VARIANT.sub("", image.parent.name)
-        frame = scene_frame(
-            image.parent.name if name == "." else name, scene_name, image.parent, image.parent
-        )
+    # A scene that lacks one picture is a frame too, so that what it lacks is said.
+    pictures = matching(root, ("im[01].png", "*/im[01].png", "*/*/im[01].png"))
+    for folder in dict.fromkeys(picture.parent for picture in pictures):
+        name = folder.relative_to(root).as_posix()
+        scene_name = _VARIANT.sub("", folder.name)
+        frame = scene_frame(folder.name if name == "." else name, scene_name, folder, folder)
         if frame is not None:
             yield frame
 

@@ -53,12 +53,12 @@ def _frames(root: Path) -> Iterator[FileFrame]:
     for scene in (root, *filter(Path.is_dir, matching(root, "*"))):
         files = [_either(scene, name) for name in ("im2", "im6", "disp2", "disp6")]
         left, right, truth_left, truth_right = files
-        if left and right and truth_left:
+        if (left or right) and truth_left:  # One that is missing is said to be.
             yield FileFrame(
                 name=scene.name,
                 scene_name=scene.name,
-                read_left=partial(read_picture, left),
-                read_right=partial(read_picture, right),
+                read_left=partial(read_picture, left or scene / "im2.png"),
+                read_right=partial(read_picture, right or scene / "im6.png"),
                 read_disparity_left=partial(read_disparity, truth_left),
                 read_disparity_right=partial(read_disparity, truth_right) if truth_right else None,
             )

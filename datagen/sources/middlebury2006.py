@@ -67,13 +67,14 @@ def _find(root: str, split: str) -> Sequence[StereoFrame]:  # noqa: ARG001
 def _frames(root: Path) -> Iterator[FileFrame]:
     for truth in matching(root, _SCENES):
         scene, truth_right = truth.parent, truth.with_name("disp5.png")
-        for left in matching(scene, ("view1.png", "Illum*/Exp*/view1.png")):
-            name = left.parent.relative_to(root).as_posix()
+        pictures = matching(scene, ("view[15].png", "Illum*/Exp*/view[15].png"))
+        for folder in dict.fromkeys(picture.parent for picture in pictures):
+            name = folder.relative_to(root).as_posix()
             yield FileFrame(
                 name=scene.name if name == "." else name,
                 scene_name=scene.name,
-                read_left=partial(read_picture, left),
-                read_right=partial(read_picture, left.with_name("view5.png")),
+                read_left=partial(read_picture, folder / "view1.png"),
+                read_right=partial(read_picture, folder / "view5.png"),
                 read_disparity_left=partial(read_disparity, truth),
                 read_disparity_right=partial(read_disparity, truth_right) if truth_right.is_file() else None,
             )

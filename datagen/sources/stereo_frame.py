@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Protocol, overload
@@ -140,6 +140,13 @@ class FileFrame:
             return None
         disparity = self._checked("right disparity", self.read_disparity_right())
         return drop_impossible(disparity, self.disparity_noise_px)[0]
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files that the frame is read from; none where it is a part of another file."""
+        readers = (getattr(self, field.name) for field in fields(self) if field.name.startswith("read_"))
+        arguments = (read.args for read in readers if isinstance(read, partial))
+        return tuple(dict.fromkeys(value for args in arguments for value in args if isinstance(value, Path)))
 
     @property
     def disparity_file(self) -> Path | None:

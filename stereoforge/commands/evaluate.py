@@ -50,6 +50,8 @@ class Evaluate:
     submission: Annotated[Path | None, shown("DIR", "none")] = None
     """Also write the refined disparities of a KITTI set as its server takes them, DIR/disp_0/NNNNNN_10.png for 2015 and
     DIR/NNNNNN_10.png for 2012: those of its testing part, or of the training part where only that is there or named."""
+    skip_broken: bool = False
+    """Leave out the frames whose files are missing or damaged, and say which; else nothing is evaluated."""
     device: Annotated[str, shown("NAME")] = "cpu"
     """What the networks run on: cpu, cuda, ..."""
 
@@ -84,7 +86,7 @@ class Evaluate:
         )
         from stereoforge.pipelines.submission import find_submission, write_submission
 
-        data = open_test_data(self.data, self.split)
+        data = open_test_data(self.data, self.split, skip_broken=self.skip_broken)
         submission = find_submission(self.data) if self.submission else None
         settings = open_settings(self.parameters, self.weights, self.predictor)
         predictors = open_predictors(self.weights, self.device, self.predictor)
@@ -99,6 +101,7 @@ class Evaluate:
                 predictors,
                 rows,
                 evaluation_options(each.family, self.bad_threshold, self.posterior),
+                skip_broken=self.skip_broken,
             )
             for each in data
         ]

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from datagen import StereoSample
+from datagen import DatasetError, StereoSample
 from datagen.dataset.manifest import read_manifest
 from datagen.formats.impossible_disparity import ImpossibleShare
 from datagen.sources.ground_truth import mean_share, require_ground_truth
+from datagen.sources.missing import ChosenFrames, describe_missing, missing_files
 from datagen.sources.registry import open_source
 from datagen.sources.stereo_frame import StereoFrame
 from datagen.sources.webdataset import ShardFrames
@@ -42,10 +43,11 @@ class TestData:
     """Not a test, whatever pytest thinks of its name."""
 
 
-def open_test_data(sources: Sequence[str], split: str) -> list[TestData]:
+def open_test_data(sources: Sequence[str], split: str, *, skip_broken: bool = False) -> list[TestData]:
     """Open data sets as `datagen.sources.registry` takes them.
 
-    Raises DatasetError, naming what is wrong; a set without a single pixel of ground truth is.
+    Raises DatasetError, naming what is wrong: a set without a single pixel of ground truth, or with missing files.
+    With `skip_broken` the frames that lack files are left out, and it is said which.
 
     A set is called after its folder, or by all of its source where two folders have one name.
     """
@@ -57,6 +59,13 @@ def open_test_data(sources: Sequence[str], split: str) -> list[TestData]:
         require_ground_truth(source, frames)
         family = family_of(source, frames)
         facts = {"Source": source, "Split": split} | ({"Family": family} if family else {})
+        if missing := missing_files(frames):
+            sentence = describe_missing(source, missing, len(frames))
+            if not skip_broken:
+                raise DatasetError(f"{source}: {sentence}; --skip-broken evaluates the other frames")
+            facts["Left out"] = sentence
+            console.print(f"{name}: left out: {sentence}", markup=False, soft_wrap=True)
+            frames = ChosenFrames(frames, [i for i in range(len(frames)) if i not in missing])
         opened.append(TestData(name, frames, family, split, facts))
     return opened
 
@@ -87,14 +96,21 @@ def evaluate_set(
     predictors: Predictors,
     methods: tuple[Method, ...] = (),
     options: EvaluationOptions | None = None,
+    *,
+    skip_broken: bool = False,
 ) -> EvaluatedSet:
-    """Run the networks and every method on every frame, showing progress, and say how much ground truth cannot be."""
+    """Run the networks and every method on every frame, showing progress, and say how much ground truth cannot be.
+
+    With `skip_broken`, frames that cannot be read are left out, and it is said which; otherwise DatasetError is raised
+    at the first. It is raised too if none is left.
+    """
     shares: list[ImpossibleShare] = []
+    broken: list[str] | None = [] if skip_broken else None
     with progress_bar() as progress:
         what = f"evaluating on {data.name}"
         task = progress.add_task(f"{what} (compiling, after an install)", total=len(data.frames))
         evaluation = evaluate(
-            _predicted(data.frames, predictors, shares),
+            _predicted(data.frames, predictors, shares, broken),
             methods,
             options or evaluation_options(data.family),
             progress=lambda done, _: progress.update(task, completed=done, description=what),
@@ -103,21 +119,39 @@ def evaluate_set(
     if impossible := mean_share(shares):
         facts["Ground truth"] = str(impossible)
         console.print(f"{data.name}: {impossible}", markup=False, soft_wrap=True)
+    if broken:
+        facts["Damaged"] = (
+            f"left out, since they cannot be read: {len(broken)} of {len(data.frames)} frames, first {broken[0]}"
+        )
+        console.print(f"{data.name}: {facts['Damaged']}", markup=False, soft_wrap=True)
     return EvaluatedSet(data.name, evaluation, data.family, data.split, facts)
 
 
 def _predicted(
-    frames: Sequence[StereoFrame], predictors: Predictors, shares: list[ImpossibleShare]
+    frames: Sequence[StereoFrame],
+    predictors: Predictors,
+    shares: list[ImpossibleShare],
+    broken: list[str] | None = None,
 ) -> Iterator[EvaluationFrame]:
-    """Every frame with its predictions; `shares` receives how much of its ground truth cannot be.
+    """Every frame with its predictions; `shares` receives how much of its ground truth cannot be, and `broken`, if it
+    is given, what is wrong with those that cannot be read and are left out.
 
     The first one's are made twice: what a first run compiles and allocates is not the predictors' time.
     """
-    for order, frame in enumerate(frames):
-        if order == 0:
-            predictors.frame(frame)
-        yield predictors.frame(frame)
+    for frame in frames:
+        try:
+            if not shares:
+                predictors.frame(frame)
+            predicted = predictors.frame(frame)
+        except DatasetError as error:
+            if broken is None:
+                raise
+            broken.append(str(error))
+            continue
         shares.append(frame.impossible_left)
+        yield predicted
+    if not shares:
+        raise DatasetError(f"no frame is left that can be read: {broken[0] if broken else 'all lack files'}")
 
 
 def report_evaluation(
