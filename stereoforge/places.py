@@ -27,8 +27,8 @@ def keep_apart(flag: str, written: Path | str, source_flag: str, source: Path | 
     text = str(source)
     if any(is_within(written, place) for place in {text, _location(text)}):
         raise UsageError(
-            f"{flag} {_short(str(written))} is, or lies in, {source_flag} {_short(text)}, which is only read: write "
-            "somewhere else"
+            f"{flag} {_short(str(written))} is, or lies in, {source_flag} {_short(text)}, which is only read: write to "
+            "another place"
         )
 
 

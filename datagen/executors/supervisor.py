@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from typing import Any
 
+from datagen.errors import MachineError
 from datagen.executors.base import Failure, FailureKind, Outcome
 from stereoforge_kit.processes import Limits, WorkerError, WorkerProcess
 
@@ -152,4 +153,5 @@ def _kind_of(error: Exception) -> FailureKind:
     number = error.errno if isinstance(error, OSError) else None
     if number in _NO_SPACE:
         return "disk_full"
-    return "environment" if number is not None or isinstance(error, ImportError) else "exception"
+    no_fault = number is not None or isinstance(error, ImportError | MachineError)
+    return "environment" if no_fault else "exception"

@@ -14,7 +14,7 @@ import numpy as np
 
 from datagen.dataset.layout import FIRST_FRAME, RENDER_PASSES, Direction, Layout, View
 from datagen.dataset.manifest import SceneManifest, file_entry, write_manifest
-from datagen.errors import DatasetError
+from datagen.errors import DatasetError, MachineError
 from datagen.formats import (
     write_camera_data,
     write_flow,
@@ -33,7 +33,7 @@ from datagen.recipe.recipe import Recipe
 from datagen.rendering.frames import BLENDER_LOG, RenderOptions, Stopwatch, ViewTargets, render_frames
 from datagen.rendering.staging import StagingArea, commit
 from scenes import Scene, scene_to_json
-from scenes.user_assets.pool import UserEnvironment, UserMesh, UserTexture, use_store
+from scenes.user_assets.pool import AssetStoreError, UserEnvironment, UserMesh, UserTexture, use_store
 from stereoforge_kit.files import LocalTree, Tree, write_text
 
 
@@ -63,11 +63,15 @@ def render_scene(job: SceneJob) -> SceneManifest:
     """Render, measure and commit one scene; return its manifest.
 
     Everything is written to a staging folder first and moved into place at the end, the manifest last. So a scene
-    with a manifest is whole, whatever happens. Raises DatasetError if every attempt at the scene is degenerate.
+    with a manifest is whole, whatever happens. Raises DatasetError if every attempt at the scene is degenerate, and
+    MachineError if a prepared file of the user's is missing or damaged.
     """
     with job.area.scene_folder(job.split, job.scene) as staging:
         watch = Stopwatch()
-        statistics = _render_staged(job, staging, watch)
+        try:
+            statistics = _render_staged(job, staging, watch)
+        except AssetStoreError as error:
+            raise MachineError(str(error)) from error
         return _commit(job, staging, watch, statistics)
 
 

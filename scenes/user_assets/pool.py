@@ -26,6 +26,10 @@ _SHA256 = re.compile(r"[0-9a-f]{64}")
 _stores: list[Path] = []
 
 
+class AssetStoreError(InputError):
+    """A prepared file of the user's is in no store, or damaged: not the world that asks for it is at fault."""
+
+
 def use_store(folder: Path) -> None:
     """Add a folder of prepared files to those in which this process looks."""
     if folder not in _stores:
@@ -38,7 +42,7 @@ def _check_sha256(text: str) -> None:
 
 
 def _load(sha256: str) -> dict[str, NDArray[np.generic]]:
-    """The arrays of a prepared file. Raises InputError for a file that is in no store, or only damaged."""
+    """The arrays of a prepared file. Raises AssetStoreError for a file that is in no store, or only damaged."""
     _check_sha256(sha256)
     damaged = None
     for folder in _stores:
@@ -50,8 +54,10 @@ def _load(sha256: str) -> dict[str, NDArray[np.generic]]:
             except (ValueError, EOFError, KeyError, RuntimeError, BadZipFile, zlib.error, struct.error):
                 damaged = path
     if damaged:
-        raise InputError(f"{damaged}: is damaged; give the folders of your files again")
-    raise InputError(f"the user's file {sha256[:12]}... is in no store; give the folders it came from again")
+        raise AssetStoreError(f"{damaged}: is damaged; give the folders of your files again")
+    raise AssetStoreError(
+        f"the user's file {sha256[:12]}... is in no store; give the folders it came from again"
+    )
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import shown
 from stereoforge.places import keep_apart
 from stereoforge.progress import console, progress_bar
-from stereoforge_kit.files import open_tree
+from stereoforge_kit.files import is_within, open_tree
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,8 @@ class Export:
             raise UsageError(f"--lidar-beams must be at least 1, got {self.lidar_beams}")
         layout, out = open_layout(self.data), open_tree(self.out)
         keep_apart("--out", self.out, "the data set", self.data)
-        keep_apart("the data set", self.data, "--out", self.out)
+        if is_within(self.data, self.out):
+            raise UsageError("--out holds the data set that is exported: write to a folder beside it")
         sets = [
             StereoDataset(self.data, split, self.render_pass)
             for split in SPLITS

@@ -48,8 +48,9 @@ class Tune:
             raise UsageError(f"--frames must be at least 1, got {self.frames}")
         if not self.data:
             raise UsageError("tune needs at least one data set")
-        for source in self.data:
-            keep_apart("--out", self.out or self.weights, "the data set", source)
+        if self.out is not None:
+            for source in self.data:
+                keep_apart("--out", self.out, "the data set", source)
         methods = parse_methods(self.methods)
         from rich.table import Table
 

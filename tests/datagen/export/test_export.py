@@ -114,6 +114,7 @@ def test_a_laser_scanner_measures_few_pixels_in_even_lines(analytic_dataset: Pat
 def test_webdataset_shards_stream_the_same_bytes(analytic_dataset: Path, tmp_path: Path) -> None:
     export(analytic_dataset, "webdataset", tmp_path / "a", "--frames-per-shard", "3")
     assert [path.name for path in sorted((tmp_path / "a").iterdir())] == [
+        "export.json",
         "index.json",
         "recipe.yaml",
         "test-000000.tar",
@@ -235,8 +236,9 @@ def test_sceneflow_is_the_published_part_of_the_data_set(analytic_dataset: Path,
         "frames_cleanpass",
         "disparity",
         "camera_data",
+        "export.json",
     }
-    files = [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
+    files = [path for path in (tmp_path / "out").glob("*/**/*") if path.is_file()]
     assert len(files) == 3 * (2 * 2 * 2 + 1)
     for path in files:
         original = analytic_dataset / path.relative_to(tmp_path / "out")

@@ -6,14 +6,16 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from datagen import render_dataset
+from datagen import read_recipe, render_dataset
 from datagen.dataset.layout import Layout
+from datagen.errors import MachineError
 from datagen.executors import Failure
-from datagen.rendering.quarantine import put_in_quarantine
+from datagen.rendering.quarantine import put_in_quarantine, quarantined_scenes
 from datagen.verify.repair import repair_dataset
 from stereoforge.cli import main
 from stereoforge_kit.files import LocalTree
@@ -137,6 +139,19 @@ def test_a_truncated_asset_costs_nothing(
     assert "has no whole prepared file of" in said
     assert repair(root, capfd)[0] == 1
     assert files(root) == before
+
+
+@pytest.mark.slow
+def test_a_damaged_asset_puts_no_scene_in_quarantine(with_meshes: Path, tmp_path: Path) -> None:
+    root = Path(shutil.copytree(with_meshes, tmp_path / "set"))
+    for asset in (root / "assets").glob("*.npz"):  # A damaged array in a file that is whole by its looks.
+        content = bytearray(asset.read_bytes())
+        content[150] ^= 1
+        asset.write_bytes(content)
+    recipe = read_recipe(root / "recipe.yaml")
+    with pytest.raises(MachineError, match="is damaged"):
+        render_dataset(replace(recipe, scenes={"train": 8}), root, executor=ONE_WORKER)
+    assert quarantined_scenes(LocalTree(root)) == []
 
 
 BLOCK = """
