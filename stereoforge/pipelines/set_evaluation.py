@@ -18,6 +18,7 @@ from refine.evaluation.results import EvaluatedSet
 from refine.evaluation.settings import Settings
 from refine.method import Method
 from refine.report.write import ReportContext, ReportFiles, write_report
+from stereoforge.inputs.images import pair_doubts
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.progress import console, progress_bar
 from training.presets import TASKS
@@ -88,28 +89,44 @@ def evaluate_set(
     methods: tuple[Method, ...] = (),
     options: EvaluationOptions | None = None,
 ) -> EvaluatedSet:
-    """Run the networks and every method on every frame, showing progress, and say how much ground truth cannot be."""
-    shares: list[ImpossibleShare] = []
+    """Run the networks and every method on every frame, showing progress, and say what is wrong with the set."""
+    doubts = _Doubts()
     with progress_bar() as progress:
         what = f"evaluating on {data.name}"
         task = progress.add_task(f"{what} (compiling, after an install)", total=len(data.frames))
         evaluation = evaluate(
-            _predicted(data.frames, predictors, shares),
+            _predicted(data.frames, predictors, doubts),
             methods,
             options or evaluation_options(data.family),
             progress=lambda done, _: progress.update(task, completed=done, description=what),
         )
     facts = dict(data.facts)
-    if impossible := mean_share(shares):
+    if impossible := mean_share(doubts.shares):
         facts["Ground truth"] = str(impossible)
         console.print(f"{data.name}: {impossible}", markup=False, soft_wrap=True)
+    for sentence, frames in doubts.pairs.items():
+        console.print(
+            f"{data.name}: {frames[0]}{f' and {len(frames) - 1} more' * (len(frames) > 1)}: {sentence}",
+            markup=False,
+            soft_wrap=True,
+        )
     return EvaluatedSet(data.name, evaluation, data.family, data.split, facts)
 
 
+@dataclass
+class _Doubts:
+    """What is odd about the frames of a set."""
+
+    shares: list[ImpossibleShare] = field(default_factory=list)
+    """How much of each frame's ground truth cannot be."""
+    pairs: dict[str, list[str]] = field(default_factory=dict)
+    """Names of frames by what is wrong with their pictures."""
+
+
 def _predicted(
-    frames: Sequence[StereoFrame], predictors: Predictors, shares: list[ImpossibleShare]
+    frames: Sequence[StereoFrame], predictors: Predictors, doubts: _Doubts
 ) -> Iterator[EvaluationFrame]:
-    """Every frame with its predictions; `shares` receives how much of its ground truth cannot be.
+    """Every frame with its predictions, and what is odd about it.
 
     The first one's are made twice: what a first run compiles and allocates is not the predictors' time.
     """
@@ -117,7 +134,9 @@ def _predicted(
         if order == 0:
             predictors.frame(frame)
         yield predictors.frame(frame)
-        shares.append(frame.impossible_left)
+        doubts.shares.append(frame.impossible_left)
+        for sentence in pair_doubts(frame.left, frame.right):
+            doubts.pairs.setdefault(sentence, []).append(frame.name)
 
 
 def report_evaluation(
