@@ -10,6 +10,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
+from datagen.blender.exact import clip_planes, set_exactly
 from datagen.blender.materials import build_material, image_from_array, image_from_radiance
 from datagen.ground_truth.scene_geometry import SceneGeometry
 from scenes.geometry.mesh import Mesh
@@ -33,7 +34,10 @@ class BuiltWorld:
 
 
 def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> BuiltWorld:
-    """Build everything in the geometry's scene into an empty Blender file."""
+    """Build everything in the geometry's scene into an empty Blender file.
+
+    Raises DatasetError for a camera that Blender cannot have.
+    """
     scene = geometry.scene
     # Families sample some materials that no object has: painting those would be for nothing.
     worn = sorted({thing.material for thing in scene.objects})
@@ -47,7 +51,10 @@ def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> Buil
 
 
 def place(world: BuiltWorld, view: str, time_frames: float) -> None:
-    """Place every object, deformed, and the camera of one view as they are at an instant."""
+    """Place every object, deformed, and the camera of one view as they are at an instant.
+
+    Raises DatasetError for a scene that Blender would clip.
+    """
     for index, (thing, block) in enumerate(zip(world.scene.objects, world.objects, strict=True)):
         if len(thing.motion.times_frames) > 1:
             block.matrix_world = Matrix(thing.pose(time_frames).tolist())
@@ -55,7 +62,12 @@ def place(world: BuiltWorld, view: str, time_frames: float) -> None:
         if thing.deformation is not None and world.deformed_at.get(index) != time_frames:
             world.deformed_at[index] = time_frames
             _move_vertices(block.data, world.geometry.local_vertices(index, time_frames))
-    world.camera.matrix_world = Matrix(world.scene.camera.pose(view, time_frames).tolist())
+    pose = world.scene.camera.pose(view, time_frames)
+    world.camera.matrix_world = Matrix(pose.tolist())
+    # Anything in front of the camera counts, however near or far.
+    near, far = clip_planes(world.geometry, pose[:3, 3], time_frames)
+    set_exactly(world.camera.data, "clip_start", near)
+    set_exactly(world.camera.data, "clip_end", far)
     bpy.context.view_layer.update()
 
 
@@ -152,15 +164,12 @@ def _build_environment(world: World, blender_scene: bpy.types.Scene) -> None:
 def _build_camera(camera: StereoCamera, blender_scene: bpy.types.Scene) -> bpy.types.Object:
     lens = bpy.data.cameras.new("camera")
     lens.sensor_fit = "HORIZONTAL"
-    lens.sensor_width = camera.sensor_width_mm
-    lens.lens = camera.focal_mm
-    # Anything in front of the camera counts: the sampler sees to the nearest disparity allowed.
-    lens.clip_start = 1e-3
-    lens.clip_end = 1e7
+    set_exactly(lens, "sensor_width", camera.sensor_width_mm)
+    set_exactly(lens, "lens", camera.focal_mm)
     block = bpy.data.objects.new("camera", lens)
     block.rotation_mode = "QUATERNION"
     blender_scene.collection.objects.link(block)
     blender_scene.camera = block
-    blender_scene.render.resolution_x = camera.width
-    blender_scene.render.resolution_y = camera.height
+    set_exactly(blender_scene.render, "resolution_x", camera.width)
+    set_exactly(blender_scene.render, "resolution_y", camera.height)
     return block

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from datagen.blender.build import BuiltWorld, place
 from datagen.blender.camera import render_radiance
+from datagen.blender.exact import set_exactly
 from datagen.dataset.layout import VIEWS, View
 from scenes.spec import FinalPass, Fog
 
@@ -60,8 +61,8 @@ def _render_view(world: BuiltWorld, view: View, frame: int, scratch: Path) -> ND
 def _lens(world: BuiltWorld, final: FinalPass) -> Iterator[None]:
     focus = world.camera.data.dof
     focus.use_dof = True
-    focus.focus_distance = final.focus_m
-    focus.aperture_fstop = final.f_number
+    set_exactly(focus, "focus_distance", final.focus_m)
+    set_exactly(focus, "aperture_fstop", final.f_number)
     try:
         yield
     finally:
@@ -91,7 +92,7 @@ def _open_shutter(world: BuiltWorld, view: str, frame: int, shutter_frames: floa
             shapes = [world.geometry.local_vertices(index, time) for _, time in keys]
             _key_shapes(world.objects[index], shapes, [clock for clock, _ in keys])
         render.use_motion_blur = True
-        render.motion_blur_shutter = shutter_frames
+        set_exactly(render, "motion_blur_shutter", shutter_frames)
         render.motion_blur_position = "CENTER"
         world.blender_scene.frame_set(SHUTTER_FRAME)
         yield

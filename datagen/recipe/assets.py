@@ -14,6 +14,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Literal, NamedTuple
 
 import cv2
 import numpy as np
@@ -33,6 +34,11 @@ from stereoforge_kit.processes import Limits
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
 TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 ENVIRONMENT_SUFFIXES = (".hdr", ".exr")
+Y_UP = (".glb",)
+"""glTF says that y points up; the other formats say nothing, and z does here."""
+UpAxis = Literal["auto", "y", "z"]
+REMARK = "remark"
+"""What a preparer returns beside the arrays where it changed something that the user should know."""
 MAX_FILE_BYTES = 500 << 20
 MAX_TRIANGLES = 300_000
 MAX_SIDE_PX = 4096
@@ -51,18 +57,28 @@ class ImportedAssets:
     pool: AssetPool
     skipped: tuple[str, ...]
     """One sentence for each file that is not usable."""
+    remarks: tuple[str, ...] = ()
+    """One sentence for each file that is used, but not as it is."""
 
 
 def import_assets(
-    store: Path, *, meshes: Path | None = None, textures: Path | None = None, environments: Path | None = None
+    store: Path,
+    *,
+    meshes: Path | None = None,
+    textures: Path | None = None,
+    environments: Path | None = None,
+    up_axis: UpAxis = "auto",
 ) -> ImportedAssets:
     """Prepare all usable files below the given folders into `store`.
+
+    A mesh that is turned upright has another name in the store than the same file as it is.
 
     Args:
         store: The folder for the prepared files; made if need be.
         meshes: A folder of OBJ, PLY, GLB and STL files.
         textures: A folder of PNG, JPEG, TIFF, WebP and BMP files.
         environments: A folder of equirectangular Radiance HDR and OpenEXR files.
+        up_axis: Which axis of the meshes points up, "y" or "z"; "auto" for what is usual in their format (`Y_UP`).
 
     Raises:
         DatasetError: For a folder that is missing or has no usable file of its kind.
@@ -70,19 +86,36 @@ def import_assets(
     """
     store.mkdir(parents=True, exist_ok=True)
     skipped: list[str] = []
+    remarks: list[str] = []
     kinds: list[tuple[Asset, ...]] = []
     for folder, suffixes, prepare, limits in (
-        (meshes, MESH_SUFFIXES, prepare_mesh, MESH_LIMITS),
+        (meshes, MESH_SUFFIXES, partial(prepare_mesh, up_axis=up_axis), MESH_LIMITS),
         (textures, TEXTURE_SUFFIXES, prepare_texture, PICTURE_LIMITS),
         (environments, ENVIRONMENT_SUFFIXES, prepare_environment, PICTURE_LIMITS),
     ):
         kinds.append(
-            () if folder is None else _import_folder(folder, suffixes, prepare, limits, store, skipped)
+            ()
+            if folder is None
+            else _import_folder(
+                folder, suffixes, prepare, limits, store, skipped, remarks, partial(_identity, up_axis)
+            )
         )
-    return ImportedAssets(AssetPool(*kinds), tuple(skipped))
+    return ImportedAssets(AssetPool(*kinds), tuple(skipped), tuple(remarks))
 
 
 Preparer = Callable[[Path], dict[str, NDArray[np.generic]]]
+
+
+def _identity(up_axis: UpAxis, path: Path) -> bytes:
+    """What tells a prepared file from another one of the same original."""
+    return b"y up" if path.suffix.lower() in MESH_SUFFIXES and is_y_up(path, up_axis) else b""
+
+
+class _Outcome(NamedTuple):
+    """Of preparing one file: why it cannot be used, or what was changed about it."""
+
+    problem: str | None = None
+    remark: str | None = None
 
 
 def _import_folder(
@@ -92,6 +125,8 @@ def _import_folder(
     limits: Limits,
     store: Path,
     skipped: list[str],
+    remarks: list[str],
+    identity: Callable[[Path], bytes] = lambda _: b"",
 ) -> tuple[Asset, ...]:
     if not folder.is_dir():
         raise DatasetError(f"{folder}: there is no such folder")
@@ -105,20 +140,24 @@ def _import_folder(
             skipped.append(f"{path}: is larger than {MAX_FILE_BYTES >> 20} MB")
             continue
         with path.open("rb") as file:
-            originals.setdefault(hashlib.file_digest(file, "sha256").hexdigest(), path)
+            digest = hashlib.file_digest(file, "sha256")
+        digest.update(identity(path))
+        originals.setdefault(digest.hexdigest(), path)
     found: list[Asset] = []
     one_worker = LocalExecutor(({},), WorkerPolicy(limits, attempts=1))
     jobs = [(path, store / f"{sha256}.npz") for sha256, path in originals.items()]
     with closing(one_worker.run(partial(_prepare_file, prepare), jobs)) as outcomes:
         for outcome in outcomes:
             path, prepared = outcome.job
-            problem = outcome.result
+            problem, remark = outcome.result or _Outcome()
             if outcome.failure is not None:
                 if outcome.failure.kind in ("environment", "disk_full"):
                     raise MachineError(
                         f"importing stopped, no file is at fault: {outcome.failure.sentence}"[:300]
                     )
                 problem = f"cannot be read, {outcome.failure.sentence}"
+            if remark is not None:
+                remarks.append(f"{path}: {remark}")
             if problem is None:
                 found.append(Asset(path.relative_to(folder).as_posix(), prepared.stem))
             else:
@@ -129,26 +168,27 @@ def _import_folder(
     return tuple(sorted(found, key=lambda asset: asset.sha256))
 
 
-def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> str | None:
+def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> _Outcome:
     """In the worker: prepare one file for the store, or say why not. Whatever a parser raises is the file's fault."""
     path, target = job
     try:
         arrays = prepare(path)
     except MemoryError:
-        return "needs too much memory"
+        return _Outcome("needs too much memory")
     except KeyError as error:
-        return f"cannot be read (it has no {error})"
+        return _Outcome(f"cannot be read (it has no {error})")
     except Exception as error:
-        return f"cannot be read ({' '.join(str(error).split())[:200] or type(error).__name__})"
+        return _Outcome(f"cannot be read ({' '.join(str(error).split())[:200] or type(error).__name__})")
+    remark = arrays.pop(REMARK, None)
     temporary = target.with_suffix(f".{os.getpid()}.tmp")
     with temporary.open("wb") as file:
         np.savez(file, **arrays)
     temporary.replace(target)
-    return None
+    return _Outcome(remark=None if remark is None else str(remark))
 
 
-def prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
-    """A mesh's `vertices` (V, 3), `triangles` (T, 3) and `corner_uv` (3 T, 2).
+def prepare_mesh(path: Path, up_axis: UpAxis = "auto") -> dict[str, NDArray[np.generic]]:
+    """A mesh's `vertices` (V, 3), z upwards, `triangles` (T, 3) and `corner_uv` (3 T, 2).
 
     Raises ValueError for a mesh of no use, and whatever the parser raises.
     """
@@ -156,6 +196,8 @@ def prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
     with path.open("rb") as file:  # From an open file no parser looks for others beside it.
         loaded = trimesh.load(file, file_type=path.suffix[1:].lower(), force="mesh", process=False, **options)
     vertices, triangles = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64)
+    if is_y_up(path, up_axis):
+        vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1)
     if len(triangles) < 4:
         raise InputError(f"it has {len(triangles)} triangles, too few for a thing")
     if len(triangles) > MAX_TRIANGLES:
@@ -173,6 +215,11 @@ def prepare_mesh(path: Path) -> dict[str, NDArray[np.generic]]:
     return {"vertices": mesh.vertices, "triangles": mesh.triangles, "corner_uv": mesh.corner_uv}
 
 
+def is_y_up(path: Path, up_axis: UpAxis) -> bool:
+    """Whether y points up in a file, by what the user says or by its format."""
+    return up_axis == "y" or (up_axis == "auto" and path.suffix.lower() in Y_UP)
+
+
 def prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
     """A texture's `image`, (H, W, 3) uint8 sRGB, as `datagen.formats.picture` reads it.
 
@@ -182,16 +229,24 @@ def prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
 
 
 def prepare_environment(path: Path) -> dict[str, NDArray[np.generic]]:
-    """An environment's `radiance`, (H, W, 3) float32 linear RGB.
+    """An environment's `radiance`, (H, W, 3) float32 linear RGB; with a remark if some of it was infinite.
 
     Raises ValueError for a file of no use, and whatever the parser raises.
     """
     radiance = _read_exr(path) if path.suffix.lower() == ".exr" else _read_hdr(path)
-    radiance = np.nan_to_num(np.maximum(_bounded(radiance), 0), posinf=0.0)
+    prepared: dict[str, NDArray[np.generic]] = {}
+    if (infinite := np.isposinf(radiance)).any():
+        # Half floats end at 65504, which a sun exceeds.
+        brightest = max(float(radiance[np.isfinite(radiance)].max(initial=0)), 0.0)
+        radiance = np.where(infinite, np.float32(brightest), radiance)
+        prepared[REMARK] = np.array(
+            f"its infinite values are taken for {brightest:g}, the brightest finite one"
+        )
+    radiance = np.nan_to_num(np.maximum(_bounded(radiance), 0), neginf=0.0)
     luminance = float(radiance.mean())
     if luminance <= 0:
         raise InputError("it is black")
-    return {"radiance": (radiance * (MEAN_LUMINANCE / luminance)).astype(np.float32)}
+    return prepared | {"radiance": (radiance * (MEAN_LUMINANCE / luminance)).astype(np.float32)}
 
 
 def _read_hdr(path: Path) -> NDArray[np.float32]:

@@ -30,6 +30,9 @@ MAX_RECIPE_BYTES = 1 << 20
 MAX_RECIPE_DEPTH = 32
 """Deepest nesting that a recipe file may have."""
 
+LEAST_SIDE_PX = 4
+"""Blender clamps the sides of a picture to this."""
+
 
 @dataclass(frozen=True)
 class Recipe:
@@ -109,6 +112,10 @@ class Recipe:
     def _check_size(self) -> None:
         """Raise DatasetError for images that no reader would take, and disparities that no image could show."""
         width, height = self.world.width, self.world.height
+        if min(width, height) < LEAST_SIDE_PX:
+            raise DatasetError(
+                f"images of {width}x{height} cannot be rendered: Blender makes no side shorter than {LEAST_SIDE_PX} px"
+            )
         if 3 * width * height > MAX_ELEMENTS:
             raise DatasetError(
                 f"images of {width}x{height} are too large: files of a data set hold {MAX_ELEMENTS // 3} pixels"

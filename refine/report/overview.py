@@ -14,6 +14,8 @@ from stereoforge_kit.viewing.plots import STYLE, pixels
 
 CELL_WIDTH_IN = 4.6
 """Width of each picture."""
+NARROWEST = 8
+"""Pictures whose sides differ by a larger factor are stretched to it."""
 
 
 def overview_picture(
@@ -50,12 +52,15 @@ def overview_picture(
         widest = max(float(np.nanpercentile(np.asarray(deviation), 99.5)), 1e-6)
         cells.append(("Standard deviation, px", disparity_picture(deviation, widest), ("magma", widest)))
     rows = -(-len(cells) // 2)
-    height_in = CELL_WIDTH_IN * image.shape[0] / image.shape[1] * 0.93 + 0.3
+    shape = image.shape[0] / image.shape[1]
+    shown = min(max(shape, 1 / NARROWEST), NARROWEST)
+    height_in = CELL_WIDTH_IN * shown * 0.93 + 0.3
     figure = Figure(figsize=(2 * CELL_WIDTH_IN, rows * height_in), layout="constrained")
     with rc_context(STYLE):
         for place, (title, picture, scale) in enumerate(cells, start=1):
             axes = figure.add_subplot(rows, 2, place)
-            axes.imshow(picture, interpolation="antialiased")
+            # Keeping the shape of a column of pixels would take hundreds of thousands of rows.
+            axes.imshow(picture, interpolation="antialiased", aspect="equal" if shape == shown else "auto")
             axes.set_title(title, loc="left")
             axes.set_axis_off()
             # The image has no scale, but keeps the room of one, so that all pictures have one size.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import shown
-from stereoforge.inputs.images import read_color_images
+from stereoforge.inputs.images import pair_doubts, read_color_images
 from stereoforge.places import keep_apart
 from stereoforge.progress import console
 
@@ -84,6 +84,7 @@ class Refine:
         """Refine the pair and write every output into the folder."""
         self._check()
         left, right, remarks = read_color_images(self.left, self.right)
+        remarks += (odd := pair_doubts(left, right))
         from stereoforge.inputs.disparity_files import read_disparity
         from stereoforge.pipelines.prediction import open_settings, predict_pair
 
@@ -113,14 +114,9 @@ class Refine:
                 prediction.disparity, prediction.confidence, prediction.gradient, left, POSTERIOR_SAMPLES
             )
         self._write(left, prediction, solution, deviation)
-        doubts = _doubts(None if given is None else given[0], prediction.confidence)
-        for note in (
-            *remarks,
-            *notes,
-            *doubts,
-            *_doubtful_views(left, right),
-            *_doubtful_result(solution.disparity),
-        ):
+        doubts = [] if odd else _doubtful_views(left, right)
+        doubts += _doubts(None if given is None else given[0], prediction.confidence)
+        for note in (*remarks, *notes, *doubts, *_doubtful_result(solution.disparity)):
             console.print(note, markup=False)
         console.print(
             f"{self.out}: disparity {solution.disparity.min():.1f} to {solution.disparity.max():.1f} px, refined in "

@@ -83,6 +83,8 @@ class Render:
     """A recipe.yaml to render."""
     meshes: Annotated[Path | None, shown("DIR", "none")] = None
     """Your own OBJ, PLY, GLB and STL files, for things among the generated ones; each is used in one split only."""
+    up_axis: Annotated[Literal["auto", "y", "z"], shown("auto|y|z")] = "auto"
+    """Which axis of your meshes points up; auto: y in GLB files, as glTF has it, and z in the others."""
     textures: Annotated[Path | None, shown("DIR", "none")] = None
     """Your own pictures, to paint things with."""
     environments: Annotated[Path | None, shown("DIR", "none")] = None
@@ -138,10 +140,16 @@ class Render:
         with temporary_folder() as folder:
             prepared = folder / "assets"
             imported = import_assets(
-                prepared, meshes=self.meshes, textures=self.textures, environments=self.environments
+                prepared,
+                meshes=self.meshes,
+                textures=self.textures,
+                environments=self.environments,
+                up_axis=self.up_axis,
             )
             for sentence in imported.skipped:
                 console.print(f"skipped {sentence}", markup=False)
+            for sentence in imported.remarks:
+                console.print(sentence, markup=False)
             try:
                 recipe = replace(recipe, assets=imported.pool)
             except DatasetError as error:

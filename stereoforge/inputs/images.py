@@ -11,6 +11,9 @@ from datagen.errors import FormatError
 from datagen.formats.picture import read_pair
 from stereoforge.errors import CommandError
 
+BLACK = 3
+"""A picture without a brighter value, of 255, is black."""
+
 
 def read_color_images(left: Path, right: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8], list[str]]:
     """Both views as `datagen.formats.picture` reads them, (H, W, 3) uint8, and remarks about them.
@@ -27,3 +30,16 @@ def read_color_images(left: Path, right: Path) -> tuple[NDArray[np.uint8], NDArr
     except FormatError as error:
         hint = "; a disparity is given with --disparity" if "map of numbers" in str(error) else ""
         raise CommandError(f"{error}{hint}") from error
+
+
+def pair_doubts(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> list[str]:
+    """A sentence for each thing that is wrong with a pair as a whole: black or plain pictures, or twice the same."""
+    doubts = []
+    for name, view in (("left", left), ("right", right)):
+        if view.max() <= BLACK:
+            doubts.append(f"the {name} picture is black")
+        elif (view == view[0, 0]).all():
+            doubts.append(f"the {name} picture has one colour only")
+    if not doubts and left.shape == right.shape and np.array_equal(left, right):
+        doubts.append("both pictures are the same: is the right view another file?")
+    return doubts

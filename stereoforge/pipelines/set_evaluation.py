@@ -19,6 +19,7 @@ from refine.evaluation.results import EvaluatedSet
 from refine.evaluation.settings import Settings
 from refine.method import Method
 from refine.report.write import ReportContext, ReportFiles, write_report
+from stereoforge.inputs.images import pair_doubts
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.progress import console, progress_bar
 from training.presets import TASKS
@@ -99,59 +100,77 @@ def evaluate_set(
     *,
     skip_broken: bool = False,
 ) -> EvaluatedSet:
-    """Run the networks and every method on every frame, showing progress, and say how much ground truth cannot be.
+    """Run the networks and every method on every frame, showing progress, and say what is wrong with the set.
 
     With `skip_broken`, frames that cannot be read are left out, and it is said which; otherwise DatasetError is raised
     at the first. It is raised too if none is left.
     """
-    shares: list[ImpossibleShare] = []
-    broken: list[str] | None = [] if skip_broken else None
+    doubts = _Doubts()
     with progress_bar() as progress:
         what = f"evaluating on {data.name}"
         task = progress.add_task(f"{what} (compiling, after an install)", total=len(data.frames))
         evaluation = evaluate(
-            _predicted(data.frames, predictors, shares, broken),
+            _predicted(data.frames, predictors, doubts, skip_broken),
             methods,
             options or evaluation_options(data.family),
             progress=lambda done, _: progress.update(task, completed=done, description=what),
         )
     facts = dict(data.facts)
-    if impossible := mean_share(shares):
+    if impossible := mean_share(doubts.shares):
         facts["Ground truth"] = str(impossible)
         console.print(f"{data.name}: {impossible}", markup=False, soft_wrap=True)
-    if broken:
+    if doubts.broken:
         facts["Damaged"] = (
-            f"left out, since they cannot be read: {len(broken)} of {len(data.frames)} frames, first {broken[0]}"
+            f"left out, since they cannot be read: {len(doubts.broken)} of {len(data.frames)} frames, first "
+            f"{doubts.broken[0]}"
         )
         console.print(f"{data.name}: {facts['Damaged']}", markup=False, soft_wrap=True)
+    for sentence, frames in doubts.pairs.items():
+        console.print(
+            f"{data.name}: {frames[0]}{f' and {len(frames) - 1} more' * (len(frames) > 1)}: {sentence}",
+            markup=False,
+            soft_wrap=True,
+        )
     return EvaluatedSet(data.name, evaluation, data.family, data.split, facts)
 
 
+@dataclass
+class _Doubts:
+    """What is odd about the frames of a set."""
+
+    shares: list[ImpossibleShare] = field(default_factory=list)
+    """How much of each frame's ground truth cannot be."""
+    pairs: dict[str, list[str]] = field(default_factory=dict)
+    """Names of frames by what is wrong with their pictures."""
+    broken: list[str] = field(default_factory=list)
+    """What is wrong with the frames that cannot be read."""
+
+
 def _predicted(
-    frames: Sequence[StereoFrame],
-    predictors: Predictors,
-    shares: list[ImpossibleShare],
-    broken: list[str] | None = None,
+    frames: Sequence[StereoFrame], predictors: Predictors, doubts: _Doubts, skip_broken: bool
 ) -> Iterator[EvaluationFrame]:
-    """Every frame with its predictions; `shares` receives how much of its ground truth cannot be, and `broken`, if it
-    is given, what is wrong with those that cannot be read and are left out.
+    """Every frame with its predictions; `doubts` receives what is odd about it.
 
     The first one's are made twice: what a first run compiles and allocates is not the predictors' time.
     """
     for frame in frames:
         try:
-            if not shares:
+            if not doubts.shares:
                 predictors.frame(frame)
             predicted = predictors.frame(frame)
         except DatasetError as error:
-            if broken is None:
+            if not skip_broken:
                 raise
-            broken.append(str(error))
+            doubts.broken.append(str(error))
             continue
-        shares.append(frame.impossible_left)
+        doubts.shares.append(frame.impossible_left)
+        for sentence in pair_doubts(frame.left, frame.right):
+            doubts.pairs.setdefault(sentence, []).append(frame.name)
         yield predicted
-    if not shares:
-        raise DatasetError(f"no frame is left that can be read: {broken[0] if broken else 'all lack files'}")
+    if not doubts.shares:
+        raise DatasetError(
+            f"no frame is left that can be read: {doubts.broken[0] if doubts.broken else 'all lack files'}"
+        )
 
 
 def report_evaluation(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from datagen.formats import read_pfm, write_pfm, write_png
+from datagen.formats import read_pfm, read_png, write_pfm, write_png
+from refine.report.overview import overview_picture
 from stereoforge.cli import main
+from stereoforge_kit.matching import seem_swapped
 from tests.training.synthetic import random_pair
 from training.networks import ConfNet, GradNet
 from training.presets import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset, find_preset
@@ -139,3 +142,38 @@ def test_contradictions_and_mistakes_are_sentences(world, tmp_path, capsys):
         refine(folder, tmp_path / "r", *more, code=code)
         assert reason in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.parametrize("shape", [(400, 1), (1, 400)])
+def test_narrow_pictures_take_no_longer_than_others(shape, tmp_path):
+    """A column of pixels was scaled to the width of other pictures, and its overview had 376,530 rows."""
+    rng = np.random.default_rng(0)
+    for name in ("left.png", "right.png"):
+        write_png(tmp_path / name, rng.integers(0, 256, (*shape, 3), np.uint8))
+    assert not seem_swapped(*(read_png(tmp_path / name) for name in ("left.png", "right.png")))
+    image = overview_picture(read_png(tmp_path / "left.png"), *[np.ones(shape)] * 3)
+    assert max(image.shape) < 20_000
+
+
+def test_the_same_picture_twice_is_doubted(world, tmp_path, capsys):
+    folder, _ = world
+    shutil.copy(folder / "left.png", tmp_path / "left.png")
+    shutil.copy(folder / "left.png", tmp_path / "right.png")
+    refine(tmp_path, tmp_path / "r", "--disparity", folder / "given.pfm")
+    said = " ".join(capsys.readouterr().out.split())
+    assert "both pictures are the same" in said
+
+
+@pytest.mark.parametrize("sentinel", [65535.0, 1e30])
+def test_sentinels_leave_the_good_pixels_alone(world, tmp_path, sentinel, capsys):
+    folder, _ = world
+    given = read_pfm(folder / "given.pfm")
+    clean, spoilt = given.copy(), given.copy()
+    clean[:, -10:], spoilt[:, -10:] = np.inf, sentinel
+    write_pfm(tmp_path / "clean.pfm", clean)
+    write_pfm(tmp_path / "spoilt.pfm", spoilt)
+    for name in ("clean", "spoilt"):
+        refine(folder, tmp_path / name, "--disparity", tmp_path / f"{name}.pfm")
+    assert "larger than the picture is wide" in " ".join(capsys.readouterr().out.split())
+    same = (read_pfm(tmp_path / name / "disparity.pfm") for name in ("clean", "spoilt"))
+    np.testing.assert_array_equal(*same)

@@ -87,7 +87,9 @@ def test_an_evaluation_says_what_it_left_out(tmp_path: Path, capsys: pytest.Capt
     evaluated = evaluate_set(data, Predictors(right, None))
     sentence = "12.50% of the disparities cannot be and are left out (12.50% larger than the picture is wide)"
     assert evaluated.facts["Ground truth"] == sentence
-    assert f"set: {sentence}" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"set: {sentence}" in said
+    assert "set: scene0 and 1 more: the left picture has one colour only" in said
 
 
 def test_no_frames_have_no_share() -> None:

@@ -17,7 +17,7 @@ import trimesh
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
-from datagen.recipe.assets import ImportedAssets, _import_folder, import_assets
+from datagen.recipe.assets import ImportedAssets, UpAxis, _import_folder, import_assets
 from datagen.rendering.estimate import estimate_run
 from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, scene_from_json, scene_to_json
@@ -158,7 +158,7 @@ def test_a_file_that_brings_its_reader_down_is_skipped(tmp_path: Path) -> None:
         (tmp_path / f"{name}.stl").write_bytes(bytes([number]))
     skipped: list[str] = []
     limits = Limits(timeout_s=2.0, memory_bytes=900 << 20)
-    (asset,) = _import_folder(tmp_path, (".stl",), crash_or_grow, limits, tmp_path, skipped)
+    (asset,) = _import_folder(tmp_path, (".stl",), crash_or_grow, limits, tmp_path, skipped, [])
     assert asset.name == "fine.stl"
     crash, greedy, slow = (sentence.removeprefix(f"{tmp_path}/") for sentence in skipped)
     assert crash == "crash.stl: cannot be read, its process crashed (SIGSEGV)"
@@ -208,3 +208,42 @@ def test_a_data_set_carries_the_files_it_uses(user: Path, tmp_path: Path) -> Non
     moved = out.rename(tmp_path / "moved")
     assert verify_dataset(moved, workers=1).problems == ()
     assert StereoDataset(moved, "train")[0].left.std() > 5
+
+
+def test_the_sun_of_half_floats_is_no_black_hole(tmp_path: Path) -> None:
+    sky = np.full((16, 32), 0.5, np.float16)
+    sky[3, 20], sky[4, 20], sky[5, 5], sky[6, 6] = np.inf, 900, np.nan, -np.inf
+    (tmp_path / "skies").mkdir()
+    OpenEXR.File({}, dict.fromkeys("RGB", sky)).write(str(tmp_path / "skies/sun.exr"))
+    found = import_assets(tmp_path / "store", environments=tmp_path / "skies")
+    assert found.remarks == (
+        f"{tmp_path / 'skies/sun.exr'}: its infinite values are taken for 900, the brightest finite one",
+    )
+    use_store(tmp_path / "store")
+    radiance = UserEnvironment(found.pool.environments[0].sha256).radiance()
+    assert (radiance[3, 20] == radiance.max()).all()
+    assert radiance[5, 5].max() == radiance[6, 6].max() == 0
+
+
+@pytest.mark.parametrize(
+    ("up_axis", "heights"),
+    [("auto", {"obj": 0, "glb": 2}), ("y", {"obj": 2, "glb": 2}), ("z", {"obj": 0, "glb": 0})],
+)
+def test_meshes_stand_as_their_format_says(
+    tmp_path: Path, up_axis: UpAxis, heights: dict[str, float]
+) -> None:
+    """A tall cone along y: upright where y points up, on its side where z does."""
+    cone = trimesh.creation.cone(radius=0.3, height=2.0)
+    cone.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0)))
+    (tmp_path / "meshes").mkdir()
+    for suffix in heights:
+        cone.export(tmp_path / f"meshes/cone.{suffix}")
+    found = import_assets(tmp_path / "store", meshes=tmp_path / "meshes", up_axis=up_axis)
+    use_store(tmp_path / "store")
+    for asset in found.pool.meshes:
+        vertices = UserMesh(asset.sha256).mesh().vertices
+        upright = np.ptp(vertices[:, 2]) > 1.9
+        assert upright == (heights[asset.name.rpartition(".")[2]] > 0)
+        if upright:  # Its tip is above.
+            tip = vertices[np.argmax(vertices[:, 2])]
+            assert np.abs(tip[:2]).max() < 0.01

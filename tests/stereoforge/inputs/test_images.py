@@ -10,7 +10,7 @@ import pytest
 
 from datagen.formats import write_pfm
 from stereoforge.errors import CommandError
-from stereoforge.inputs.images import read_color_images
+from stereoforge.inputs.images import pair_doubts, read_color_images
 
 COLORS = np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8)
 
@@ -56,3 +56,15 @@ def test_what_is_no_picture_is_said_without_the_decoder_s_words(tmp_path: Path) 
         with pytest.raises(CommandError) as refusal:
             read_color_images(whole, tmp_path / name)
         assert str(refusal.value) == f"{tmp_path / name}: {sentence}"
+
+
+def test_pairs_that_are_wrong_as_a_whole() -> None:
+    other, black, plain = 255 - COLORS, np.full_like(COLORS, 2), np.full_like(COLORS, 77)
+    assert pair_doubts(COLORS, other) == []
+    assert pair_doubts(COLORS, COLORS[:-1]) == []
+    assert pair_doubts(COLORS, COLORS.copy()) == [
+        "both pictures are the same: is the right view another file?"
+    ]
+    assert pair_doubts(black, COLORS) == ["the left picture is black"]
+    assert pair_doubts(black, black) == ["the left picture is black", "the right picture is black"]
+    assert pair_doubts(COLORS, plain) == ["the right picture has one colour only"]
