@@ -49,8 +49,8 @@ class Evaluate:
     submission: Annotated[Path | None, shown("DIR", "none")] = None
     """Also write the refined disparities of KITTI sets as its server takes them: DIR/disp_0/NNNNNN_10.png, those of
     the set's testing part if it is there."""
-    device: Annotated[str, shown("NAME")] = "cpu"
-    """What the networks run on: cpu, cuda, ..."""
+    device: Annotated[str, shown("NAME")] = "auto"
+    """What the networks run on: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
     def run(self) -> None:
         """Predict, refine and score every frame, then write the report."""
@@ -78,7 +78,9 @@ class Evaluate:
             report_evaluation,
         )
         from stereoforge.pipelines.submission import find_submission_frames, write_submission
+        from training.devices import parse_device
 
+        parse_device(self.device)
         data = open_test_data(self.data, self.split)
         to_submit = find_submission_frames(self.data) if self.submission else []
         settings = open_settings(self.parameters, self.weights, self.predictor)
