@@ -10,10 +10,12 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from stereoforge.commands import COMMANDS, after_interruption, command_class, command_summary
 from stereoforge_kit.errors import UserError
+from stereoforge_kit.siblings import check_siblings
 
 DEBUG_FLAG = "--debug"
 DESCRIPTION = (
@@ -40,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(0)
     command = None
     try:
+        _leave_current_folder()
+        check_siblings(__file__, "scenes", "datagen", "training", "refine")
         with _terminated_like_interrupted():
             command = _parse([word for word in words if word != DEBUG_FLAG])
             command.run()
@@ -50,6 +54,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
             raise
         sys.exit(_say(*_explain(error)))
     sys.exit(0)
+
+
+def _leave_current_folder() -> None:
+    """Import nothing from the current folder, where `python -m` and an empty entry in PYTHONPATH look first.
+
+    Unless the program lies there: `training` and `scenes` are what many folders of other projects are called.
+    """
+    here, home = Path.cwd(), Path(__file__).resolve().parent.parent
+    if here != home:
+        sys.path[:] = [entry for entry in sys.path if Path(entry).resolve() != here]
 
 
 @contextlib.contextmanager

@@ -103,7 +103,8 @@ def import_assets(
                 folder, suffixes, prepare, limits, store, skipped, remarks, partial(_identity, up_axis)
             )
         )
-    return ImportedAssets(AssetPool(*kinds), tuple(skipped), tuple(remarks))
+    pool = AssetPool(meshes=kinds[0], textures=kinds[1], environments=kinds[2])
+    return ImportedAssets(pool, tuple(skipped), tuple(remarks))
 
 
 def describe_splits(pool: AssetPool) -> list[str]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Literal
@@ -75,7 +75,7 @@ class TunedMethod:
         return self.trials[0].objective
 
 
-def measure(method: Method, frames: Sequence[EvaluationFrame], bad_threshold: float = 1.0) -> Errors:
+def measure(method: Method, frames: Iterable[EvaluationFrame], bad_threshold: float = 1.0) -> Errors:
     """Run a method that gives disparities on every frame and pool its errors."""
     errors, gradients = ErrorPool(bad_threshold), GradientPool()
     for frame in frames:
@@ -106,7 +106,9 @@ def tune_method(
     known: Sequence[Trial] = (),
     on_trial: Callable[[Trial], None] | None = None,
 ) -> TunedMethod:
-    """Search a method's parameters.
+    """Search a method's parameters, until a round over them gains next to nothing.
+
+    Defaults whose objective is not finite are the only trial: there is nothing to compare others with.
 
     Args:
         kind: The method; its `search` may be empty, and then its defaults are tried only.
@@ -116,7 +118,7 @@ def tune_method(
     """
     search = _Search(kind, evaluate, {_key(trial.setting): trial for trial in known}, on_trial)
     best = search.trial(kind())
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if math.isfinite(best[0]) else 0):
         before = best[0]
         for paths in (*((path,) for path in kind.search), *kind.tied):
             best = search.along(paths, best)

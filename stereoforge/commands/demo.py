@@ -21,12 +21,14 @@ class Demo:
 
     out: Annotated[Path, shown("DIR")] = Path("demo")
     """Folder for everything."""
+    device: Annotated[str, shown("NAME")] = "auto"
+    """What the networks run on: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
     def run(self) -> None:
         """Run every stage and print the main numbers and where the report is."""
         from stereoforge.pipelines.demo import run_demo, summary_table
 
-        result = run_demo(self.out)
+        result = run_demo(self.out, device=self.device)
         console.print(summary_table(result.evaluation, "networks trained just now"))
         console.print(summary_table(result.bundled, "bundled weights, same frames"))
         console.print(

@@ -52,8 +52,8 @@ class Evaluate:
     DIR/NNNNNN_10.png for 2012: those of its testing part, or of the training part where only that is there or named."""
     skip_broken: bool = False
     """Leave out the frames whose files are missing or damaged, and say which; else nothing is evaluated."""
-    device: Annotated[str, shown("NAME")] = "cpu"
-    """What the networks run on: cpu, cuda, ..."""
+    device: Annotated[str, shown("NAME")] = "auto"
+    """What the networks run on: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
     def run(self) -> None:
         """Predict, refine and score every frame, then write the report."""
@@ -85,7 +85,9 @@ class Evaluate:
             report_evaluation,
         )
         from stereoforge.pipelines.submission import find_submission, write_submission
+        from training.devices import parse_device
 
+        parse_device(self.device)
         data = open_test_data(self.data, self.split, skip_broken=self.skip_broken)
         submission = find_submission(self.data) if self.submission else None
         settings = open_settings(self.parameters, self.weights, self.predictor)

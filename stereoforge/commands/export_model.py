@@ -24,13 +24,15 @@ class ExportModel:
     """Run folder of the networks."""
     out: Annotated[Path, shown("DIR")]
     """Folder for stereoforge.onnx and the model card."""
+    device: Annotated[str, shown("NAME")] = "auto"
+    """What torch computes on to compare: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
     def run(self) -> None:
         """Write the ONNX file and compare its results with torch's."""
         from training.prediction.onnx_export import export_model
         from training.runs.model_card import write_model_card
 
-        exported = export_model(self.run_folder, self.out)
+        exported = export_model(self.run_folder, self.out, self.device)
         write_model_card(self.run_folder, self.out)
         console.print(
             f"{exported.path}: {', '.join(exported.outputs)}; onnxruntime agrees with torch to "

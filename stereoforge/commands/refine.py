@@ -77,8 +77,8 @@ class Refine:
     deviation: bool = False
     """Also write deviation.pfm, the refined disparity's standard deviation in pixels under the MRF's own Gaussian (of
     the exact form): its order, least sure last, is what it is good for. Takes 32 more solves."""
-    device: Annotated[str, shown("NAME")] = "cpu"
-    """What the networks run on: cpu, cuda, ..."""
+    device: Annotated[str, shown("NAME")] = "auto"
+    """What the networks run on: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
     def run(self) -> None:
         """Refine the pair and write every output into the folder."""

@@ -22,6 +22,7 @@ from datagen.rendering.run import SCENE_TIMEOUT_S, local_executor, ray_executor
 from scenes import FAMILIES
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_histogram, parse_range, parse_shard, parse_size, shown
+from stereoforge.pipelines.rendering import choose_device
 from stereoforge.places import keep_apart
 from stereoforge.progress import console, progress_bar
 from stereoforge_kit.files import open_tree, temporary_folder
@@ -63,8 +64,8 @@ class Render:
     targets: Annotated[str | None, shown("all|LIST", "none")] = None
     """Targets besides disparity, gradient, occlusion and object index, comma-separated: material_index,
     normals, optical_flow, disparity_change, motion_boundaries."""
-    device: Literal["cpu", "cuda", "optix", "hip", "metal"] = "cpu"
-    """What Cycles computes on."""
+    device: Literal["auto", "cpu", "cuda", "optix", "hip", "metal"] = "auto"
+    """What Cycles computes on; auto takes the GPU that Blender finds on this machine, else the cpu."""
     workers: Annotated[int | None, shown("N", "one a core")] = None
     """Worker processes."""
     only_failed: bool = False
@@ -119,6 +120,9 @@ class Render:
             raise UsageError(
                 "--dry-run counts what is missing, not what is in quarantine: leave --only-failed out"
             )
+        if self.device == "auto":
+            replace(self, device=choose_device()).run()
+            return
         recipe = self._recipe()
         executor = self._executor()
         recipe = fit_disparities(recipe)  # Once, also where assets make the folder first.

@@ -53,8 +53,8 @@ class Study:
     """Rows of the subject's tables, comma-separated."""
     seed: Annotated[int, shown("N")] = 0
     """Everything random follows from it."""
-    device: Annotated[str, shown("NAME")] = "cpu"
-    """What the networks run on: cpu, cuda, ..."""
+    device: Annotated[str, shown("NAME")] = "auto"
+    """What the networks run on: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
     def run(self) -> None:
         """Run every step that is not done yet, then write the results."""
@@ -62,7 +62,9 @@ class Study:
         for domain in plan.domains.values():
             keep_apart("--out", self.out, "the domain", domain.source)
         from stereoforge.study import run_study
+        from training.devices import parse_device
 
+        parse_device(self.device)  # before hours of rendering
         result = run_study(plan, self.out, device=self.device)
         for gap in result.gaps:
             shares = ", ".join(f"{name} {share:.0%}" for name, share in gap.shares.items() if share == share)

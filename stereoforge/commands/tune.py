@@ -39,8 +39,8 @@ class Tune:
     """Validation frames looked at, evenly spread; all are kept in memory."""
     objective: Literal["balanced", "bad", "epe", "gradient"] = "balanced"
     """What shall be small: bad pixels, end-point error, gradient error, or the mean of the three."""
-    device: Annotated[str, shown("NAME")] = "cpu"
-    """What the networks run on: cpu, cuda, ..."""
+    device: Annotated[str, shown("NAME")] = "auto"
+    """What the networks run on: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
     def run(self) -> None:
         """Search the parameters and write them into the run folder."""
@@ -64,7 +64,9 @@ class Tune:
             untrained,
             untrained_notes,
         )
+        from training.devices import parse_device
 
+        parse_device(self.device)
         sources = [open_source(text) for text in self.data]
         predictors = open_predictors(self.weights, self.device, self.predictor)
         asked = [method for method in default_methods(methods) if method.search]

@@ -30,6 +30,7 @@ from stereoforge.pipelines.set_evaluation import (
 )
 from stereoforge.progress import console
 from stereoforge_kit.files import write_text
+from training.devices import parse_device
 from training.runs.request import TrainingRequest
 from training.runs.train import train
 
@@ -73,8 +74,15 @@ class DemoResult:
     minutes: float
 
 
-def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
-    """Run every stage, each continuing what an earlier run left; raises what the stages raise."""
+def run_demo(out: Path, plan: DemoPlan | None = None, device: str = "auto") -> DemoResult:
+    """Run every stage, each continuing what an earlier run left; raises what the stages raise.
+
+    Args:
+        out: Folder for everything.
+        plan: How much of everything.
+        device: What the networks run on, as `training.devices.parse_device` takes it.
+    """
+    parse_device(device)  # before anything is rendered
     plan = plan or DemoPlan()
     clock = _Clock(out / "seconds.txt")
     data, weights = out / "data", out / "weights"
@@ -87,16 +95,22 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
         with clock.stage(f"training the {network}, {plan.steps[network]} steps"):
             train(
                 TrainingRequest(
-                    network, ((data, 1.0),), weights, "tiny", steps=plan.steps[network], resume=True
+                    network,
+                    ((data, 1.0),),
+                    weights,
+                    "tiny",
+                    steps=plan.steps[network],
+                    resume=True,
+                    device=device,
                 )
             )
     (test,) = open_test_data([str(data)], "test")
     # There is no time to choose parameters here; the bundled ones were chosen on a validation set of such worlds.
     settings = open_settings(None, BUNDLED_WEIGHTS)
     with clock.stage(f"refining and evaluating {len(test.frames)} test pairs"):
-        evaluated = evaluate_set(test, open_predictors(weights), settings.rows())
+        evaluated = evaluate_set(test, open_predictors(weights, device), settings.rows())
     with clock.stage("the same with the networks that come with StereoForge"):
-        bundled = _evaluate_bundled(test, settings)
+        bundled = _evaluate_bundled(test, settings, device)
     minutes = clock.seconds / 60
     files = report_evaluation(
         [evaluated, bundled],
@@ -109,11 +123,11 @@ def run_demo(out: Path, plan: DemoPlan | None = None) -> DemoResult:
     return DemoResult(data, weights, gallery, files.html, evaluated.evaluation, bundled.evaluation, minutes)
 
 
-def _evaluate_bundled(test: TestData, settings: Settings) -> EvaluatedSet:
+def _evaluate_bundled(test: TestData, settings: Settings, device: str) -> EvaluatedSet:
     """The bundled weights on the demo's test frames."""
     facts = {**test.facts, "Networks": "bundled: " + "; ".join(describe_networks(BUNDLED_WEIGHTS))}
     named = replace(test, name=f"{test.name}, bundled weights", facts=facts)
-    return evaluate_set(named, open_predictors(BUNDLED_WEIGHTS), settings.rows(SHIPPED_METHODS))
+    return evaluate_set(named, open_predictors(BUNDLED_WEIGHTS, device), settings.rows(SHIPPED_METHODS))
 
 
 class _Clock:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -31,8 +32,72 @@ from refine.registry import known_methods, table_order
 from stereoforge.errors import CommandError
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.progress import console, progress_bar
+from stereoforge_kit.viewing import duration
 
 VALIDATION = "val"
+
+
+@dataclass
+class _Search:
+    """The search of one method: first its defaults, which tell how long a trial takes, then all others."""
+
+    kind: type[Method]
+    frames: Sequence[EvaluationFrame]
+    score: Callable[[Errors], float]
+    trials: list[Trial]
+    """Those that are known, which are not repeated."""
+    remember: Callable[[Sequence[Trial]], None]
+    """Called with all trials after each."""
+    trial_seconds: float = 0.0
+    """What the latest trial took, or would have without compiling."""
+
+    @property
+    def trials_left(self) -> int:
+        """About how many trials are still to be made."""
+        return max(usual_trials(self.kind) - len(self.trials), 0)
+
+    def begin(self, on_trial: Callable[[], None]) -> None:
+        """Try the defaults, unless it is known what comes of them."""
+        method = self.kind()
+        setting = {path: value_at(method, path) for path in self.kind.search}
+        if all(trial.setting != setting for trial in self.trials):
+            self._note(Trial(setting, self._evaluate(method)))
+            on_trial()
+
+    def end(self, on_trial: Callable[[], None]) -> TunedMethod:
+        """Try all that is left to try."""
+
+        def note(trial: Trial) -> None:
+            self._note(trial)
+            on_trial()
+
+        return tune_method(self.kind, self._evaluate, tuple(self.trials), note)
+
+    def _note(self, trial: Trial) -> None:
+        self.trials.append(trial)
+        self.remember(self.trials)
+
+    def _evaluate(self, method: Method) -> float:
+        began: list[float] = []
+
+        def timed() -> Iterator[EvaluationFrame]:
+            for frame in self.frames:
+                began.append(time.perf_counter())
+                yield frame
+
+        value = self.score(measure(method, timed()))
+        # The first frame is left out where there are others: it may have waited for a compiler.
+        since = began[min(1, len(began) - 1)]
+        self.trial_seconds = (time.perf_counter() - since) * len(began) / max(len(began) - 1, 1)
+        return value
+
+
+def _time_left(searches: Sequence[_Search]) -> str:
+    """About how long searches take, in words; nothing if they are at their end or it is not known yet."""
+    if any(search.trials_left and not search.trial_seconds for search in searches):
+        return ""
+    seconds = sum(search.trials_left * search.trial_seconds for search in searches)
+    return f"about {duration(seconds)}" if seconds else ""
 
 
 @dataclass
@@ -55,31 +120,41 @@ class Tuning:
             for name, method in earlier.methods.items()
         }
         initial = measure(known_methods()["regressor"](), self.frames)
+        searches = [self._search(kind, initial, earlier.trials.get(kind.name, ())) for kind in kinds]
         with progress_bar() as progress:
             bar = progress.add_task("tuning", total=sum(usual_trials(kind) for kind in kinds))
+            for search in searches:
+                progress.update(bar, description=f"tuning {search.kind.name}")
+                search.begin(lambda: progress.advance(bar))
+            if left := _time_left(searches):
+                trials = sum(search.trials_left for search in searches)
+                progress.console.print(
+                    f"tuning {len(searches)} methods on {len(self.frames)} frames takes {left} for some {trials} trials"
+                )
             done = 0
-            for kind in kinds:
-                progress.update(bar, description=f"tuning {kind.name}")
-                self._tune(kind, initial, earlier.trials.get(kind.name, ()), lambda: progress.advance(bar))
-                done += usual_trials(kind)
+            for number, search in enumerate(searches, 1):
+                progress.update(bar, description=f"tuning {search.kind.name}")
+                self.tuned[search.kind.name] = result = search.end(lambda: progress.advance(bar))
+                done += usual_trials(search.kind)
                 progress.update(bar, completed=done)
+                left = _time_left(searches[number:])
+                progress.console.print(
+                    f"{search.kind.name}: {result.default_objective:.3f} to {result.objective:.3f} in "
+                    f"{len(result.trials)} trials" + (f"; {left} left" if left else "")
+                )
         self._follow()
         write_settings(self.out, self.tuned, self.about)
         return self.tuned
 
-    def _tune(self, kind: type[Method], initial: Errors, known: Sequence[Trial], step: Any) -> None:
-        tried = list(known)
+    def _search(self, kind: type[Method], initial: Errors, known: Sequence[Trial]) -> _Search:
+        def remember(trials: Sequence[Trial]) -> None:
+            self.tuned[kind.name] = TunedMethod.best_of(kind, trials)
+            write_settings(self.out, self.tuned, {**self.about, "whole": False})
 
-        def remember(trial: Trial) -> None:
-            tried.append(trial)
-            so_far = {**self.tuned, kind.name: TunedMethod.best_of(kind, tried)}
-            write_settings(self.out, so_far, {**self.about, "whole": False})
-            step()
+        def score(errors: Errors) -> float:
+            return objective_of(errors, initial, self.objective)
 
-        def evaluate(method: Method) -> float:
-            return objective_of(measure(method, self.frames), initial, self.objective)
-
-        self.tuned[kind.name] = tune_method(kind, evaluate, known, remember)
+        return _Search(kind, self.frames, score, list(known), remember)
 
     def _follow(self) -> None:
         """Give methods that hold another one its parameters."""

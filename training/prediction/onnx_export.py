@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.onnx import OnnxExporterError
 
 from stereoforge_kit.files import temporary_folder, write_bytes
+from training.devices import parse_device
 from training.errors import TrainingError
 from training.networks import ConfNet, Correlation1D, DispNetCorr1D, GradNet
 from training.networks.inference import head_inputs, network_size
@@ -90,7 +91,7 @@ class ExportedNetworks(nn.Module):
         return tuple(answers)
 
 
-def export_model(run: Path, out: Path) -> ExportedModel:
+def export_model(run: Path, out: Path, device: str = "cpu") -> ExportedModel:
     """Write `stereoforge.onnx` with the regressor of a run folder, and its ConfNet and GradNet if it has them.
 
     The model takes images of any size that is a multiple of 64. Before the file is kept, onnxruntime runs it on two
@@ -99,10 +100,13 @@ def export_model(run: Path, out: Path) -> ExportedModel:
     Args:
         run: Run folder.
         out: Folder for the file.
+        device: What torch computes the outputs on that are compared, as `training.devices.parse_device` takes it.
 
     Raises:
-        TrainingError: no regressor, damaged weights, a network that ONNX cannot express, or outputs that differ.
+        TrainingError: no regressor, no such device, damaged weights, a network that ONNX cannot express, or outputs
+            that differ.
     """
+    chosen = parse_device(device)
     networks = ExportedNetworks(*StereoPredictor(run).networks).eval()
     with temporary_folder() as folder:
         written = folder / FILE_NAME
@@ -110,7 +114,7 @@ def export_model(run: Path, out: Path) -> ExportedModel:
             _write(networks, written)
         except OnnxExporterError as error:
             raise TrainingError(f"{run}: torch cannot write it as ONNX: {_first_sentence(error)}") from error
-        difference = max(_compare(networks, written, size) for size in ((64, 128), (128, 192)))
+        difference = max(_compare(networks, written, size, chosen) for size in ((64, 128), (128, 192)))
         if not difference <= TOLERANCE:
             raise TrainingError(f"{run}: onnxruntime's outputs differ from torch's by {difference:.2g}")
         path = out / FILE_NAME
@@ -146,7 +150,7 @@ def _write(networks: ExportedNetworks, path: Path) -> None:
         networks.regressor.correlation = correlation
 
 
-def _compare(networks: ExportedNetworks, path: Path, size: tuple[int, int]) -> float:
+def _compare(networks: ExportedNetworks, path: Path, size: tuple[int, int], device: torch.device) -> float:
     import onnxruntime
 
     assert network_size(*size) == size
@@ -154,8 +158,9 @@ def _compare(networks: ExportedNetworks, path: Path, size: tuple[int, int]) -> f
     left, right = torch.rand(2, 1, 3, *size, generator=generator)
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     answers = session.run(None, {"left": left.numpy(), "right": right.numpy()})
-    with torch.no_grad():
-        expected = networks(left, right)
+    # TensorFloat-32, cuDNN's default for convolutions, has three digits.
+    with torch.no_grad(), torch.backends.cudnn.flags(allow_tf32=False):
+        expected = [maps.cpu() for maps in networks.to(device)(left.to(device), right.to(device))]
     return max(
         float((torch.from_numpy(answer) - truth).abs().max() / truth.abs().max().clamp(min=1))
         for answer, truth in zip(answers, expected, strict=True)

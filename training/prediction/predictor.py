@@ -10,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from training.devices import parse_device
 from training.errors import TrainingError
 from training.networks import ConfNet, DispNetCorr1D, GradNet
 from training.networks.cost_features import CostFeatures
@@ -48,15 +49,16 @@ class StereoPredictor:
 
         Args:
             run: Run folder.
-            device: A torch device.
+            device: As `training.devices.parse_device` takes it.
             regressor: `regressor`, or `regressor_f`. The latter's disparity comes without confidence and gradient,
                 since those networks were trained on the features of `regressor`.
 
         Raises:
-            TrainingError: no regressor, damaged files, or a ConfNet or GradNet trained on another regressor.
+            TrainingError: no regressor, no such device, damaged files, or a ConfNet or GradNet trained on another
+                regressor.
         """
         run = Path(run)
-        self._device = torch.device(device)
+        self._device = parse_device(device)
         stored = load_regressor(run, regressor)
         self._regressor = stored.network.to(self._device)
         self._confnet: ConfNet | None = None
@@ -116,14 +118,14 @@ class RegressorFreePredictor:
 
         Args:
             run: Run folder.
-            device: A torch device.
+            device: As `training.devices.parse_device` takes it.
 
         Raises:
-            TrainingError: no such folder, or damaged files.
+            TrainingError: no such folder, no such device, or damaged files.
         """
         run = Path(run)
         require_run_folder(run)
-        self._device = torch.device(device)
+        self._device = parse_device(device)
         self._confnet: ConfNet | None = None
         self._gradnet: GradNet | None = None
         if has_weights(run, "confnet_free"):

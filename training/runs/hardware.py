@@ -9,6 +9,7 @@ import torch
 from pytorch_lightning.strategies import DDPStrategy
 from torch import nn
 
+from training.devices import parse_device
 from training.errors import TrainingError
 
 Precision = Literal["32", "bf16", "16"]
@@ -29,25 +30,19 @@ def trainer_options(device: str, precision: Precision) -> dict[str, Any]:
     """The options of Lightning's trainer for a device, a precision and the processes that torchrun started.
 
     Args:
-        device: `auto`, `cpu`, `cuda`, `cuda:1`, ...
+        device: As `training.devices.parse_device` takes it.
         precision: Bits of the convolutions.
 
     Raises:
         TrainingError: a device or a precision that this machine does not have.
     """
-    kind, _, index = device.partition(":")
-    try:
-        torch.device("cpu" if kind == "auto" else device)
-    except RuntimeError as error:
-        raise TrainingError(f"there is no device {device!r}; try auto, cpu, cuda or cuda:1") from error
-    if kind == "cuda" and not torch.cuda.is_available():
-        raise TrainingError(f"cannot train on {device}: torch finds no GPU here")
-    on_gpu = kind == "cuda" or (kind == "auto" and torch.cuda.is_available())
+    chosen = parse_device(device)
+    on_gpu = chosen.type == "cuda"
     if precision == "16" and not on_gpu:
         raise TrainingError("16-bit floats need a GPU; bf16 works on CPUs too")
     options: dict[str, Any] = {
-        "accelerator": kind,
-        "devices": [int(index)] if index and kind != "cpu" else 1,
+        "accelerator": chosen.type,
+        "devices": 1 if chosen.index is None else [chosen.index],
         "precision": "32-true" if precision == "32" else f"{precision}-mixed",
     }
     if process_count() > 1:

@@ -68,6 +68,15 @@ def test_the_search_walks_to_the_minimum_and_tries_nothing_twice():
     assert list(found.trials) == told
 
 
+def test_a_search_ends_where_there_is_nothing_to_compare_or_to_gain():
+    seen: list[Valley] = []
+    tune_method(Valley, lambda method: seen.append(method) or float("inf"))
+    assert seen == [Valley()]
+    seen.clear()
+    tune_method(Valley, lambda method: seen.append(method) or 1.0)
+    assert len(seen) == 1 + 2 * len(Valley.search)
+
+
 @dataclass(frozen=True)
 class Diagonal(Valley):
     """Its valley runs aslant, so that each round gets a step further; eight of them to the end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -107,3 +108,15 @@ def test_a_set_without_a_validation_split_is_refused():
         [DataSource(unsplit, "sets/flat", (0, 1))], SimpleNamespace(frame=lambda _: "frame"), 5
     )
     assert chosen == ["frame", "frame"]
+
+
+def test_a_search_says_how_long_it_takes_before_it_does_and_what_is_left(tmp_path, capsys):
+    names = ("wmf", "grad", "ours")
+    found = search(tmp_path / "parameters.json").run(names)
+    first, *lines = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"tuning 3 methods on 2 frames takes about \d+ \w+ for some \d+ trials", first)
+    methods = [name for name in found if name in names]
+    for name, line, last in zip(methods, lines, (False, False, True), strict=True):
+        trials = len(found[name].trials)
+        assert re.fullmatch(rf"{name}: \d\.\d+ to \d\.\d+ in {trials} trials(; about \d+ \w+ left)?", line)
+        assert (not last) == line.endswith(" left")
