@@ -31,7 +31,7 @@ _TWELVE_BITS = 4095
 _TIFF = (b"II*\0", b"MM\0*")
 _WIDTH, _HEIGHT, _BITS_PER_SAMPLE = 256, 257, 258
 """Tags of TIFF."""
-_TURNS: dict[int, Callable[[Any], Any]] = {
+_TURNS: dict[int, Callable[[NDArray[Any]], NDArray[Any]]] = {
     2: lambda pixels: pixels[:, ::-1],
     3: lambda pixels: pixels[::-1, ::-1],
     4: lambda pixels: pixels[::-1],
@@ -231,8 +231,8 @@ def _as_color(pixels: Pixels, full: int) -> NDArray[np.uint8]:
     if pixels.ndim == 2:
         pixels = pixels[..., None]
     channels = pixels.shape[2]
-    color: NDArray[Any] = pixels[..., :-1] if channels in (2, 4) else pixels
-    alpha = pixels[..., -1:] if channels in (2, 4) else None
+    color: NDArray[Any]
+    color, alpha = (pixels[..., :-1], pixels[..., -1:]) if channels in (2, 4) else (pixels, None)
     if alpha is not None and (alpha < full).any():
         # In float32 this is exact for 8 bits.
         opacity = np.minimum(alpha.astype(np.float32) / full, 1)
