@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -20,6 +20,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from datagen.dataset.layout import SPLITS
 from datagen.errors import DatasetError
 from datagen.executors import LocalExecutor, WorkerPolicy
 from datagen.formats.limits import check_image_size
@@ -30,6 +31,8 @@ from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import walk_files
 from stereoforge_kit.processes import Limits
 
+ASSET_KINDS = ("meshes", "textures", "environments")
+"""The fields of `AssetPool` that hold files, named as their flags are."""
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
 TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 ENVIRONMENT_SUFFIXES = (".hdr", ".exr")
@@ -79,6 +82,29 @@ def import_assets(
             () if folder is None else _import_folder(folder, suffixes, prepare, limits, store, skipped)
         )
     return ImportedAssets(AssetPool(*kinds), tuple(skipped))
+
+
+def describe_splits(pool: AssetPool) -> list[str]:
+    """A sentence for each kind of user assets that there are: how many files each split has."""
+    sentences = []
+    for name in ASSET_KINDS:
+        if files := getattr(pool, name):
+            counts = [f"{len(getattr(pool.of_split(split), name))} {split}" for split in SPLITS]
+            sentences.append(f"{name}: {len(files)} files, {', '.join(counts)}")
+    return sentences
+
+
+def require_assets(pool: AssetPool, splits: Iterable[str]) -> None:
+    """Raise DatasetError for a split without any file of a kind that there are files of."""
+    for split in splits:
+        of_split = pool.of_split(split)
+        for name in ASSET_KINDS:
+            files = getattr(pool, name)
+            if files and not getattr(of_split, name):
+                raise DatasetError(
+                    f"split {split} has none of the {len(files)} files of --{name}, each of which is used in one split "
+                    "only; with three files or more every split has some"
+                )
 
 
 Preparer = Callable[[Path], dict[str, NDArray[np.generic]]]

@@ -100,7 +100,9 @@ def _sample_sides(rng: np.random.Generator, config: DrivingConfig, drive: Drive)
 
 
 _REPLACEABLE = Replaceable(
-    props=r"(bin|bench|cabinet|bollard) .*|shrub .*", painted=r"house .* walls|block .*|fence .*"
+    props=r"(bin|bench|cabinet|bollard) .*|shrub .*",
+    painted=r"house .* walls|block .*|fence .*",
+    groups=r"(parked [LR]?[0-9.]+) .*",
 )
 
 FAMILY = Family("driving", DrivingConfig, sample_driving, _REPLACEABLE)

@@ -102,7 +102,8 @@ class FlyingThingsConfig(FamilyConfig):
     """0 few things of plain shapes, 1 as many and as complicated as the other ranges say."""
 
     def with_assets(self, assets: AssetPool) -> FlyingThingsConfig:
-        return replace(self, assets=assets)
+        share = self.user_share if assets.share is None else assets.share
+        return replace(self, assets=assets, user_share=share)
 
     def within_disparities(self, least_px: float, greatest_px: float) -> FlyingThingsConfig:
         """This config for a range of disparities, pixels; the background keeps its share of the logarithmic range.

@@ -8,7 +8,7 @@ Because names are contents, it does not matter in which store a file is found.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
 
@@ -57,11 +57,25 @@ class Asset:
     def __post_init__(self) -> None:
         _check_sha256(self.sha256)
 
-    @property
-    def split(self) -> str:
-        """The one split that may use it, by its content: 80 % train, 10 % val, 10 % test."""
-        share = int(self.sha256[:8], 16) / 2**32
-        return "train" if share < 0.8 else "val" if share < 0.9 else "test"
+
+def spread_over_splits(assets: tuple[Asset, ...]) -> dict[str, tuple[Asset, ...]]:
+    """The files of one kind that each split may use: about 80 % train, 10 % val, 10 % test, by their content.
+
+    A file's split follows from its SHA-256 alone, unless that leaves a split without any, as it often does with a few
+    files. Then each split gets its share of the files in the order of their SHA-256, and at least one. A single file is
+    for train, and the second is for test.
+    """
+    by_content: dict[str, list[Asset]] = {"train": [], "val": [], "test": []}
+    for asset in assets:
+        share = int(asset.sha256[:8], 16) / 2**32
+        by_content["train" if share < 0.8 else "val" if share < 0.9 else "test"].append(asset)
+    if all(by_content.values()):
+        return {split: tuple(files) for split, files in by_content.items()}
+    ordered = tuple(sorted(assets, key=lambda asset: asset.sha256))
+    test = max(1, round(0.1 * len(ordered))) if len(ordered) > 1 else 0
+    val = max(1, round(0.1 * len(ordered))) if len(ordered) > 2 else 0
+    train = len(ordered) - val - test
+    return {"train": ordered[:train], "val": ordered[train : train + val], "test": ordered[train + val :]}
 
 
 @dataclass(frozen=True)
@@ -71,18 +85,22 @@ class AssetPool:
     meshes: tuple[Asset, ...] = ()
     textures: tuple[Asset, ...] = ()
     environments: tuple[Asset, ...] = ()
+    share: float | None = field(default=None, metadata={"omit_default": True})
+    """Share (0..1) of what can be replaced that is made from these files; None for the family's own."""
+
+    def __post_init__(self) -> None:
+        if self.share is not None and not 0 < self.share <= 1:
+            raise InputError(
+                f"the share of the user's files must be above 0 and at most 1, got {self.share:g}"
+            )
 
     def __bool__(self) -> bool:
         return bool(self.meshes or self.textures or self.environments)
 
     def of_split(self, split: str) -> AssetPool:
         """The files that a split may use."""
-        return AssetPool(
-            *(
-                tuple(asset for asset in kind if asset.split == split)
-                for kind in (self.meshes, self.textures, self.environments)
-            )
-        )
+        kinds = (self.meshes, self.textures, self.environments)
+        return AssetPool(*(spread_over_splits(kind)[split] for kind in kinds), self.share)
 
 
 @dataclass(frozen=True)

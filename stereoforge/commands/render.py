@@ -14,7 +14,7 @@ from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dat
 from datagen.dataset.layout import EXTRA_TARGETS, Layout
 from datagen.dataset.manifest import SceneManifest
 from datagen.executors import Executor
-from datagen.recipe.assets import import_assets
+from datagen.recipe.assets import describe_splits, import_assets, require_assets
 from datagen.recipe.recipe import fit_disparities
 from datagen.rendering.estimate import estimate_run
 from datagen.rendering.quarantine import QuarantinedScene, quarantined_scenes
@@ -86,6 +86,8 @@ class Render:
     """Your own pictures, to paint things with."""
     environments: Annotated[Path | None, shown("DIR", "none")] = None
     """Your own equirectangular HDR and EXR pictures, to light the worlds."""
+    own_share: Annotated[float | None, shown("SHARE", 0.5)] = None
+    """Share from 0 to 1 of the things, surfaces and skies that can be replaced to make from your own files."""
     disparity_range: Annotated[str | None, shown("LOW,HIGH", "the family's")] = None
     """Least and greatest disparity of surfaces in pixels, met by choosing depths (flying_things) or the baseline
     (the others, which reach to the horizon: LOW is 0); scenes outside are drawn anew."""
@@ -103,6 +105,11 @@ class Render:
         parse_shard(self.shard)
         if not self.out:
             raise UsageError("--out needs a folder or a URL")
+        if self.own_share is not None:
+            if not 0 < self.own_share <= 1:
+                raise UsageError(f"--own-share must be above 0 and at most 1, got {self.own_share:g}")
+            if not (self.meshes or self.textures or self.environments):
+                raise UsageError("--own-share goes with --meshes, --textures or --environments")
         if self.dry_run and self.only_failed:
             raise UsageError(
                 "--dry-run counts what is missing, not what is in quarantine: leave --only-failed out"
@@ -139,8 +146,11 @@ class Render:
             )
             for sentence in imported.skipped:
                 console.print(f"skipped {sentence}", markup=False)
+            for sentence in describe_splits(imported.pool):
+                console.print(sentence, markup=False)
             try:
-                recipe = replace(recipe, assets=imported.pool)
+                require_assets(imported.pool, recipe.scenes)
+                recipe = replace(recipe, assets=replace(imported.pool, share=self.own_share))
             except DatasetError as error:
                 raise UsageError(str(error)) from error
             render_dataset(replace(recipe, scenes={}), self.out)  # Claims the folder, or refuses it.

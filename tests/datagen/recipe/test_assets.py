@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import re
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -17,10 +18,18 @@ import trimesh
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
-from datagen.recipe.assets import ImportedAssets, _import_folder, import_assets
+from datagen.recipe.assets import (
+    ImportedAssets,
+    _import_folder,
+    describe_splits,
+    import_assets,
+    require_assets,
+)
+from datagen.recipe.recipe import recipe_from_text, recipe_to_text
 from datagen.rendering.estimate import estimate_run
 from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, scene_from_json, scene_to_json
+from scenes.spec import SceneObject
 from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture, use_store
 from stereoforge.commands.render import Render
 from stereoforge_kit.processes import Limits
@@ -100,6 +109,81 @@ def test_each_file_is_in_one_split_and_which_one_depends_on_its_content_only() -
     assert not set(pools[0]) & set(pools[1]) | set(pools[0]) & set(pools[2]) | set(pools[1]) & set(pools[2])
 
 
+@pytest.mark.parametrize("count", [3, 4, 6, 9, 12, 30])
+def test_few_files_are_spread_over_all_splits(count: int) -> None:
+    """Among three files the hash alone leaves a split empty nine times of ten."""
+    rng = np.random.default_rng(count)
+    for _ in range(20):
+        assets = tuple(Asset(f"{k}.obj", f"{int(rng.integers(2**32)):08x}" + "0" * 56) for k in range(count))
+        pools = [AssetPool(meshes=assets).of_split(split).meshes for split in ("train", "val", "test")]
+        assert all(pools)
+        assert len(pools[0]) >= count / 3
+        assert sorted(a.sha256 for pool in pools for a in pool) == sorted(a.sha256 for a in assets)
+        again = [AssetPool(meshes=assets[::-1]).of_split(split).meshes for split in ("train", "val", "test")]
+        assert [set(pool) for pool in again] == [set(pool) for pool in pools]
+
+
+def test_a_split_without_files_is_refused_and_the_others_are_counted() -> None:
+    assets = tuple(Asset(f"{k}.obj", f"{k:064x}") for k in range(5))
+    one, two = AssetPool(meshes=assets[:1]), AssetPool(meshes=assets[:2], textures=assets)
+    require_assets(one, ["train"])
+    with pytest.raises(DatasetError, match="split test has none of the 1 files of --meshes"):
+        require_assets(one, ["train", "test"])
+    require_assets(two, ["train", "test"])
+    with pytest.raises(DatasetError, match="split val has none of the 2 files of --meshes"):
+        require_assets(two, ["val"])
+    assert describe_splits(two) == [
+        "meshes: 2 files, 1 train, 0 val, 1 test",
+        "textures: 5 files, 3 train, 1 val, 1 test",
+    ]
+
+
+def test_the_share_of_the_user_s_files(imported: ImportedAssets) -> None:
+    config = FAMILIES["driving"].config()
+    counts = []
+    for share in (0.1, None, 1.0):
+        pool = replace(imported.pool, share=share)
+        recipe = Recipe(config, {"train": 1}, assets=pool)
+        scene = recipe.sample("train", 0)
+        counts.append(sum(isinstance(thing.shape, UserMesh) for thing in scene.objects))
+        assert ("\n  share: " in recipe_to_text(recipe)) == (share is not None)
+        assert recipe_from_text(recipe_to_text(recipe).encode(), "recipe") == recipe
+    assert counts[0] < counts[1] < counts[2]
+    with pytest.raises(ValueError, match="above 0 and at most 1"):
+        AssetPool(share=1.5)
+
+
+def test_in_driving_parked_cars_are_replaced_as_a_whole(imported: ImportedAssets) -> None:
+    """Props alone covered a thousandth of the pixels. The mesh stands where the wheels did, within the car's box."""
+    recipe = Recipe(FAMILIES["driving"].config(), {"train": 1}, assets=replace(imported.pool, share=1.0))
+    own = replace(recipe, assets=AssetPool())
+    scenes = ((index, own.sample("train", index)) for index in range(9))
+    index, before = next(
+        found for found in scenes if any("parked" in thing.name for thing in found[1].objects)
+    )
+    after = {thing.name: thing for thing in recipe.sample("train", index).objects}
+    assert not any(re.fullmatch(r"parked \S+ (body|wheels|glass)", name) for name in after)
+    cars = {thing.name.removesuffix(" body") for thing in before.objects if thing.name.startswith("parked")}
+    cars = {name for name in cars if name.count(" ") == 1}
+    assert len(cars) > 5
+    for name in cars:
+        new = world_box([after[f"{name} of the user"]])
+        old = world_box([thing for thing in before.objects if thing.name.startswith(f"{name} ")])
+        assert new[0][2] == pytest.approx(old[0][2], abs=0.1)
+        assert (new[0] >= old[0] - 0.5).all()
+        assert (new[1] <= old[1] + 0.5).all()
+        assert new[1][2] - new[0][2] > 0.5
+
+
+def world_box(parts: list[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
+    vertices = []
+    for part in parts:
+        pose = part.motion.pose(0.0)
+        vertices.append(part.shape.mesh().vertices * part.scale_m @ pose[:3, :3].T + pose[:3, 3])
+    every = np.concatenate(vertices)
+    return every.min(axis=0), every.max(axis=0)
+
+
 def test_scenes_of_a_split_use_that_split_s_files(imported: ImportedAssets) -> None:
     config = FAMILIES["flying_things"].config(
         flying_objects=(15, 15), background_objects=(1, 1), user_share=0.8
@@ -126,7 +210,10 @@ def test_every_family_takes_the_user_s_files_in_the_place_of_its_own(
         before, after = recipe.sample("train", index), own.sample("train", index)
         assert scene_from_json(scene_to_json(after)) == after
         pictures |= {m.color.sha256 for m in after.materials if isinstance(m.color, UserTexture)}
-        for old, new in zip(before.objects, after.objects, strict=True):
+        whole = {thing.name: thing for thing in after.objects}
+        kept = [(old, whole[old.name]) for old in before.objects if old.name in whole]
+        assert len(kept) == len(whole) - sum(name.endswith("of the user") for name in whole)
+        for old, new in kept:
             if not isinstance(new.shape, UserMesh):
                 assert new == old
                 continue
