@@ -81,7 +81,7 @@ def import_assets(
         kinds.append(
             () if folder is None else _import_folder(folder, suffixes, prepare, limits, store, skipped)
         )
-    return ImportedAssets(AssetPool(*kinds), tuple(skipped))
+    return ImportedAssets(AssetPool(kinds[0], kinds[1], kinds[2]), tuple(skipped))
 
 
 def describe_splits(pool: AssetPool) -> list[str]:

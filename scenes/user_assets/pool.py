@@ -99,8 +99,10 @@ class AssetPool:
 
     def of_split(self, split: str) -> AssetPool:
         """The files that a split may use."""
-        kinds = (self.meshes, self.textures, self.environments)
-        return AssetPool(*(spread_over_splits(kind)[split] for kind in kinds), self.share)
+        meshes, textures, environments = (
+            spread_over_splits(kind)[split] for kind in (self.meshes, self.textures, self.environments)
+        )
+        return AssetPool(meshes, textures, environments, self.share)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes.motion.trajectories import vector
 from scenes.random_draws import chance, choose
@@ -129,6 +130,7 @@ def _in_box(name: str, parts: list[SceneObject], shape: UserMesh) -> SceneObject
     )
 
 
-def _vertices_in(into: np.ndarray, part: SceneObject) -> np.ndarray:
+def _vertices_in(into: NDArray[np.float64], part: SceneObject) -> NDArray[np.float64]:
+    """The vertices (V, 3) of a part in the frame that a matrix (4, 4) leads to from the world."""
     pose = into @ part.motion.pose(part.motion.times_frames[0])
     return part.shape.mesh().vertices * np.array(part.scale_m) @ pose[:3, :3].T + pose[:3, 3]
