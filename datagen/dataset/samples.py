@@ -205,6 +205,10 @@ class StereoSample:
             self.layout.file(kind, self.split, self.scene, view, self.frame) for kind, view in wanted
         )
 
+    def has(self, path: Path) -> bool:
+        """Whether the scene's manifest has a file, as those of targets that were asked for and rendered."""
+        return self.layout.relative(path) in self._entries
+
     def intact(self, path: Path) -> Path:
         """Compare one of the scene's files with the manifest and return its path.
 

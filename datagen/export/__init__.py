@@ -3,10 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from datagen.dataset.layout import EXTRA_TARGETS
 from datagen.dataset.samples import StereoDataset
 from datagen.export.kitti import export_kitti
 from datagen.export.sceneflow import export_sceneflow
 from datagen.export.webdataset import export_webdataset
+from datagen.recipe.recipe import read_recipe
 from stereoforge_kit.files import Tree
 
 
@@ -22,8 +24,8 @@ class ExportOptions:
 
 Progress = Callable[[int, int], None]
 """Called with (frames done, frames in all)."""
-Exporter = Callable[[Sequence[StereoDataset], Tree, ExportOptions, Progress], None]
-"""Writes all frames of some splits of one data set into a folder or URL."""
+Exporter = Callable[[Sequence[StereoDataset], Tree, ExportOptions, Progress], list[str] | None]
+"""Writes all frames of some splits of one data set into a folder or URL; may return sentences for the user."""
 
 EXPORTERS: dict[str, Exporter] = {
     "kitti": lambda sets, out, options, progress: export_kitti(sets, out, options.lidar_beams, progress),
@@ -34,4 +36,25 @@ EXPORTERS: dict[str, Exporter] = {
 }
 """Every exporter by the name of its format on the command line."""
 
-__all__ = ["EXPORTERS", "ExportOptions", "Exporter", "Progress"]
+_CANNOT_HOLD = {
+    "kitti": (
+        "right disparity",
+        "disparity_gradient",
+        "objects that are no vehicles",
+        "poses",
+        *EXTRA_TARGETS,
+    ),
+    "sceneflow": ("disparity_gradient", "occlusion", "object_index", "normals", "material_index"),
+    "webdataset": (),
+}
+"""What the layout of a format has no place for."""
+
+
+def left_out(name: str, dataset: StereoDataset) -> str | None:
+    """A sentence: what of a data set the format of this name cannot hold; None if it holds all. Raises DatasetError."""
+    there = set(read_recipe(dataset.layout.recipe).targets)
+    lacking = [what for what in _CANNOT_HOLD[name] if what not in EXTRA_TARGETS or what in there]
+    return f"{name} has no place for: {', '.join(lacking)}" if lacking else None
+
+
+__all__ = ["EXPORTERS", "ExportOptions", "Exporter", "Progress", "left_out"]

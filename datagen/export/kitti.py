@@ -35,8 +35,10 @@ def export_kitti(
     out: Tree,
     lidar_beams: int | None,
     progress: Callable[[int, int], None],
-) -> None:
+) -> list[str]:
     """Write the frames of each split, numbered from 0, and `frames.txt` with their names.
+
+    Returns a sentence if disparities became invalid because they are too large to store.
 
     Args:
         sets: One data set for each split.
@@ -47,15 +49,27 @@ def export_kitti(
     Raises:
         DatasetError: For damaged files.
     """
-    total, done = sum(map(len, sets)), 0
+    total, done, too_large = sum(map(len, sets)), 0, 0.0
     for frames in sets:
         folder, names = FOLDERS[frames.split], []
         for number, sample in enumerate(frames):
             _write_frame(out, folder, number, sample, lidar_beams)
+            too_large += share_too_large(sample.disparity_left)
             names.append(f"{number:06d}_10 {sample.name}\n")
             done += 1
             progress(done, total)
         out.write(f"{folder}/{FRAME_LIST}", "".join(names).encode())
+    if not too_large:
+        return []
+    return [
+        f"KITTI stores no disparity of 256 px and more: {too_large / total:.2%} of the pixels became invalid"
+    ]
+
+
+def share_too_large(disparity: NDArray[np.float32]) -> float:
+    """The share (0..1) of the pixels of a disparity (H, W) in px that are finite and too large to store."""
+    scaled = np.rint(disparity.astype(np.float64) * UNITS_PER_PX)
+    return float((np.isfinite(scaled) & (scaled > np.iinfo(np.uint16).max)).mean())
 
 
 def encode_disparity(disparity: NDArray[np.float32], keep: NDArray[np.bool_]) -> NDArray[np.uint16]:

@@ -1,4 +1,5 @@
-"""FlyingThings3D as it was published (Mayer et al., CVPR 2016): images, disparities and poses, and nothing else.
+"""FlyingThings3D as it was published (Mayer et al., CVPR 2016): images, disparities and poses; where they were rendered
+also optical flow, disparity change and motion boundaries. Nothing else.
 
 A data set of StereoForge already has this layout. The export copies that part of it, for tools that stumble over the
 rest.
@@ -15,8 +16,15 @@ from datagen.dataset.manifest import read_manifest
 from datagen.dataset.samples import StereoDataset
 from stereoforge_kit.files import Tree
 
-PUBLISHED_KINDS = (*RENDER_PASSES.values(), "disparity", "camera_data")
-"""The kinds of files that are copied."""
+PUBLISHED_KINDS = (
+    *RENDER_PASSES.values(),
+    "disparity",
+    "camera_data",
+    "optical_flow",
+    "disparity_change",
+    "motion_boundaries",
+)
+"""The kinds of files that are copied: those that have the published encoding here."""
 
 
 def export_sceneflow(sets: Sequence[StereoDataset], out: Tree, progress: Callable[[int, int], None]) -> None:

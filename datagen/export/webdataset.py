@@ -12,10 +12,11 @@ import tarfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 
-from datagen.dataset.layout import KINDS, RENDER_PASSES, TARGETS, VIEWS
+from datagen.dataset.layout import EXTRA_TARGETS, KINDS, RENDER_PASSES, TARGETS, VIEWS
 from datagen.dataset.manifest import FileEntry, file_entry, read_manifest, seal
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.errors import DatasetError
+from datagen.formats import read_camera_data
 from datagen.recipe.recipe import read_recipe, recipe_to_text
 from datagen.sources.webdataset import INDEX_NAME, META
 from stereoforge_kit.errors import InputError
@@ -89,10 +90,19 @@ def _members(sample: StereoSample) -> Iterator[tuple[str, bytes]]:
             path = sample.layout.file(kind, sample.split, sample.scene, view, sample.frame)
             what = view if kind in RENDER_PASSES.values() else f"{kind}_{view}"
             yield f"{what}{path.suffix}", sample.intact(path).read_bytes()
+    for kind in EXTRA_TARGETS:
+        for direction in KINDS[kind].directions:
+            for view in VIEWS:
+                path = sample.layout.file(kind, sample.split, sample.scene, view, sample.frame, direction)
+                if sample.has(path):
+                    what = f"{kind}_{direction}_{view}" if direction else f"{kind}_{view}"
+                    yield f"{what}{path.suffix}", sample.intact(path).read_bytes()
 
 
 def _meta(sample: StereoSample) -> dict[str, object]:
     camera = sample.scene_record.camera
+    path = sample.layout.file("camera_data", sample.split, sample.scene)
+    poses = read_camera_data(sample.intact(path))[sample.frame]
     return {
         "split": sample.split,
         "scene": sample.scene,
@@ -103,4 +113,5 @@ def _meta(sample: StereoSample) -> dict[str, object]:
         "height": camera.height,
         "focal_px": camera.focal_px,
         "baseline_m": camera.baseline_m,
+        "poses": {view: pose.tolist() for view, pose in zip(VIEWS, poses, strict=True)},
     }

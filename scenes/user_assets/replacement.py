@@ -131,5 +131,6 @@ def _in_box(name: str, parts: list[SceneObject], shape: UserMesh) -> SceneObject
 
 
 def _vertices_in(into: NDArray[np.float64], part: SceneObject) -> NDArray[np.float64]:
+    """The vertices (V, 3) of a part in the frame that a matrix (4, 4) leads to from the world."""
     pose = into @ part.motion.pose(part.motion.times_frames[0])
     return part.shape.mesh().vertices * np.array(part.scale_m) @ pose[:3, :3].T + pose[:3, 3]

@@ -10,7 +10,7 @@ import tyro
 from datagen import StereoDataset
 from datagen.dataset.layout import SPLITS
 from datagen.dataset.samples import open_layout
-from datagen.export import EXPORTERS, ExportOptions
+from datagen.export import EXPORTERS, ExportOptions, left_out
 from datagen.export.folder import export_folder, export_record
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import shown
@@ -26,7 +26,7 @@ class Export:
     data: Annotated[tyro.conf.Positional[str], shown("DIR")]
     """Folder of the data set, or its URL."""
     format: Annotated[Literal["kitti", "sceneflow", "webdataset"], shown("kitti|sceneflow|webdataset")]
-    """kitti: 16-bit PNG disparities; sceneflow: what FlyingThings3D has and no more; webdataset: tar files."""
+    """kitti: 16-bit PNG disparities; sceneflow: what FlyingThings3D has; webdataset: tar files."""
     out: Annotated[str, shown("DIR2")]
     """Folder or URL to write to: new, empty, or with the same export, which continues."""
     render_pass: Annotated[Literal["clean", "final"], shown("clean|final")] = "clean"
@@ -63,10 +63,13 @@ class Export:
         record = export_record(self.format, sets, options.get(self.format, {}))
         with export_folder(out, record, overwrite=self.overwrite) as target, progress_bar() as progress:
             task = progress.add_task("exporting", total=None)
-            EXPORTERS[self.format](
+            remarks = EXPORTERS[self.format](
                 sets,
                 target,
                 ExportOptions(self.frames_per_shard, self.lidar_beams),
                 lambda done, total: progress.update(task, completed=done, total=total),
             )
         console.print(f"{self.out}: {sum(map(len, sets))} frames as {self.format}")
+        for sentence in (left_out(self.format, sets[0]), *(remarks or ())):
+            if sentence:
+                console.print(sentence, markup=False, soft_wrap=True)

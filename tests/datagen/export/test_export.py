@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -14,9 +15,11 @@ import webdataset
 
 from datagen import DatasetError, StereoDataset
 from datagen.dataset.layout import Layout
+from datagen.dataset.manifest import file_entry, read_manifest, write_manifest
 from datagen.export import EXPORTERS, ExportOptions
-from datagen.export.kitti import encode_disparity, vehicle_numbers
+from datagen.export.kitti import encode_disparity, share_too_large, vehicle_numbers
 from datagen.export.lidar import lidar_mask
+from datagen.formats import read_camera_data
 from datagen.sources.registry import open_source
 from datagen.verify.dataset_check import verify_dataset
 from scenes import sample_scene
@@ -148,6 +151,8 @@ def test_webdataset_shards_stream_the_same_bytes(analytic_dataset: Path, tmp_pat
         meta = json.loads(sample["meta.json"])
         assert (meta["scene"], meta["frame"], meta["render_pass"]) == (frame.scene, frame.frame, "clean")
         assert meta["baseline_m"] == frame.scene_record.camera.baseline_m
+        poses = read_camera_data(layout.file("camera_data", "train", frame.scene))[frame.frame]
+        np.testing.assert_array_equal([meta["poses"][view] for view in ("left", "right")], poses)
 
 
 @pytest.mark.parametrize("kind", EXPORTERS)
@@ -243,6 +248,56 @@ def test_sceneflow_is_the_published_part_of_the_data_set(analytic_dataset: Path,
     for path in files:
         original = analytic_dataset / path.relative_to(tmp_path / "out")
         assert path.read_bytes() == original.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("kind", "says"),
+    [
+        (
+            "kitti",
+            "kitti has no place for: right disparity, disparity_gradient, objects that are no vehicles, poses",
+        ),
+        ("sceneflow", "sceneflow has no place for: disparity_gradient, occlusion, object_index"),
+        ("webdataset", None),
+    ],
+)
+def test_what_a_format_cannot_hold_is_said(
+    analytic_dataset: Path, kind: str, says: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    export(analytic_dataset, kind, tmp_path / "out")
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if "no place" in line] == ([says] if says else [])
+    assert not any("256 px" in line for line in lines)
+
+
+def test_flow_and_the_like_are_carried_where_they_were_rendered(own_dataset: Path, tmp_path: Path) -> None:
+    """The scene of the fixture has none, so its manifest gets some."""
+    layout = Layout(own_dataset)
+    added = [
+        layout.file("optical_flow", "test", 0, "left", 6, "into_future"),
+        layout.file("normals", "test", 0, "right", 6),
+    ]
+    for path in added:
+        path.parent.mkdir(parents=True)
+        path.write_bytes(path.name.encode())
+    manifest = read_manifest(layout.manifest("test", 0))
+    files = (*manifest.files, *(file_entry(own_dataset, path) for path in added))
+    write_manifest(layout.manifest("test", 0), replace(manifest, files=files))
+    export(own_dataset, "webdataset", tmp_path / "wds")
+    (sample, _) = webdataset.WebDataset(str(tmp_path / "wds/test-000000.tar"), shardshuffle=False)
+    assert sample["optical_flow_into_future_left.pfm"] == added[0].name.encode()
+    assert sample["normals_right.exr"] == added[1].name.encode()
+    export(own_dataset, "sceneflow", tmp_path / "sceneflow")
+    copied = tmp_path / "sceneflow" / layout.relative(added[0])
+    assert copied.read_bytes() == added[0].name.encode()
+    assert not (tmp_path / "sceneflow/normals").exists()
+
+
+def test_the_share_that_kitti_cannot_store() -> None:
+    assert (
+        share_too_large(np.array([[0.0, 255.99, 256.1, np.nan, np.inf, 3.0, 1, 1, 300, 1]], np.float32))
+        == 0.2
+    )
 
 
 @pytest.mark.parametrize(

@@ -147,7 +147,7 @@ def test_the_share_of_the_user_s_files(imported: ImportedAssets) -> None:
         recipe = Recipe(config, {"train": 1}, assets=pool)
         scene = recipe.sample("train", 0)
         counts.append(sum(isinstance(thing.shape, UserMesh) for thing in scene.objects))
-        assert ("share" in recipe_to_text(recipe)) == (share is not None)
+        assert ("\n  share: " in recipe_to_text(recipe)) == (share is not None)
         assert recipe_from_text(recipe_to_text(recipe).encode(), "recipe") == recipe
     assert counts[0] < counts[1] < counts[2]
     with pytest.raises(ValueError, match="above 0 and at most 1"):
@@ -157,12 +157,16 @@ def test_the_share_of_the_user_s_files(imported: ImportedAssets) -> None:
 def test_in_driving_parked_cars_are_replaced_as_a_whole(imported: ImportedAssets) -> None:
     """Props alone covered a thousandth of the pixels. The mesh stands where the wheels did, within the car's box."""
     recipe = Recipe(FAMILIES["driving"].config(), {"train": 1}, assets=replace(imported.pool, share=1.0))
-    before = replace(recipe, assets=AssetPool()).sample("train", 0)
-    after = {thing.name: thing for thing in recipe.sample("train", 0).objects}
+    own = replace(recipe, assets=AssetPool())
+    scenes = ((index, own.sample("train", index)) for index in range(9))
+    index, before = next(
+        found for found in scenes if any("parked" in thing.name for thing in found[1].objects)
+    )
+    after = {thing.name: thing for thing in recipe.sample("train", index).objects}
     assert not any(re.fullmatch(r"parked \S+ (body|wheels|glass)", name) for name in after)
     cars = {thing.name.removesuffix(" body") for thing in before.objects if thing.name.startswith("parked")}
     cars = {name for name in cars if name.count(" ") == 1}
-    assert len(cars) > 20
+    assert len(cars) > 5
     for name in cars:
         new = world_box([after[f"{name} of the user"]])
         old = world_box([thing for thing in before.objects if thing.name.startswith(f"{name} ")])
