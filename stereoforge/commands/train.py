@@ -66,7 +66,7 @@ class Train:
     """Run folder of the regressor to start from or to build on; for joint, of all three networks and, where they are
     validated, of the refinement's parameters, which are copied too."""
     resume: bool = False
-    """Continue from the last checkpoint as if never interrupted."""
+    """Continue from the last checkpoint as if never interrupted; --steps may be larger than before."""
     steps: Annotated[int | None, shown("N", "the preset's")] = None
     """Optimizer steps; all schedules are scaled to them."""
     seed: Annotated[int, shown("N")] = 0
@@ -74,7 +74,8 @@ class Train:
     workers: Annotated[int, shown("N")] = 0
     """Processes that prepare crops; results do not depend on their number."""
     device: Annotated[str, shown("NAME")] = "auto"
-    """auto, cpu, cuda, cuda:1, ...; torchrun starts one process a device."""
+    """auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps; torchrun starts one process a
+    device."""
     precision: Literal["32", "bf16", "16"] = "32"
     """Bits of the convolutions; 16 and bf16 are mixed precision."""
 
@@ -83,7 +84,17 @@ class Train:
         """How to go on after an interruption."""
         if self.task == "rdf":
             return "nothing was written; run the same command again"
-        return "the same command with --resume continues from the last checkpoint"
+        from training.errors import TrainingError
+        from training.runs.checkpoints import checkpoint_step
+        from training.runs.run_folder import checkpoint_path
+
+        try:
+            step = checkpoint_step(checkpoint_path(self.out, self.task))
+        except TrainingError as error:
+            return str(error)
+        if step is None:
+            return "there is no checkpoint yet: run again with --resume to start from step 0"
+        return f"run again with --resume to go on from step {step}"
 
     def run(self) -> None:
         """Train the network, or continue with --resume."""
@@ -165,9 +176,10 @@ class Train:
                 )
         from stereoforge.pipelines.forest import PLANS, train_forest
         from stereoforge.pipelines.prediction import forest_file
+        from training.devices import parse_device
 
-        device = "cpu" if self.device == "auto" else self.device
-        forest = train_forest(data, self.out, PLANS[self.preset], self.seed, device)
+        parse_device(self.device)
+        forest = train_forest(data, self.out, PLANS[self.preset], self.seed, self.device)
         console.print(
             f"{forest_file(self.out)}: {len(forest.roots)} trees of {len(forest.feature)} nodes in all",
             markup=False,

@@ -18,6 +18,7 @@ from pathlib import Path
 import imageio.v3 as iio
 import numpy as np
 import pytest
+import torch
 
 from datagen import StereoDataset
 from datagen.formats import read_pfm
@@ -379,7 +380,7 @@ INTERRUPTED = [
     (
         ("train", "regressor", "--data", "set", "--out", "run"),
         "training.runs.train.train",
-        "with --resume continues",
+        "there is no checkpoint yet: run again with --resume to start from step 0",
     ),
     (
         ("train", "rdf", "--data", "set", "--out", "run"),
@@ -412,6 +413,19 @@ def test_sigterm_ends_every_command_with_how_to_go_on(
     assert sentence.startswith("stereoforge: interrupted; ")
     assert how in sentence
     assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_an_interrupted_training_names_the_step_it_goes_on_from(
+    tmp_path: Path, refused: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checkpoint = tmp_path / "logs" / "regressor" / "last.ckpt"
+    checkpoint.parent.mkdir(parents=True)
+    torch.save({"global_step": 24}, checkpoint)
+    monkeypatch.setattr("training.runs.train.train", lambda *_: signal.raise_signal(signal.SIGTERM))
+    words = ("train", "regressor", "--data", "set", "--out", tmp_path)
+    assert refused(130, *words) == "stereoforge: interrupted; run again with --resume to go on from step 24"
+    checkpoint.write_bytes(b"damaged")
+    assert f"{checkpoint}: cannot be read, so the run cannot be resumed" in refused(130, *words)
 
 
 def test_debug_shows_the_traceback(tmp_path: Path) -> None:

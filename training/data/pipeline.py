@@ -271,15 +271,21 @@ class StereoDataModule(pl.LightningDataModule):
         return mean.astype(np.float32)
 
     def train_dataloader(self) -> DataLoader[StereoBatch]:
-        """The crops of the current block; under torchrun, this process's share of every step."""
-        assert self.trainer is not None
-        return self.block(self.trainer.current_epoch, self.trainer.global_rank, self.trainer.world_size)
+        """The crops from the current step to the next validation; under torchrun, this process's share of every step.
 
-    def block(self, number: int, rank: int = 0, processes: int = 1) -> DataLoader[StereoBatch]:
-        """The crops of the steps [number * validation_interval, (number + 1) * validation_interval).
+        Lightning cannot resume a run between two validations exactly; to begin an epoch at whatever step it was can.
+        """
+        assert self.trainer is not None
+        loop, step = self.trainer.fit_loop.epoch_loop, self.trainer.global_step
+        loop.restarting = False
+        loop._batches_that_stepped = step  # what loggers count
+        return self.block(step, self.trainer.global_rank, self.trainer.world_size)
+
+    def block(self, first: int, rank: int = 0, processes: int = 1) -> DataLoader[StereoBatch]:
+        """The crops of the steps from `first` to the next multiple of `validation_interval`, or to the run's end.
 
         Args:
-            number: Of the block.
+            first: Number of the first step.
             rank: Of this process.
             processes: Number of processes; each takes `batch_size` crops of every step.
         """
@@ -289,7 +295,7 @@ class StereoDataModule(pl.LightningDataModule):
             self._sources, self._steps * per_step, self._seed, self._sampling.curriculum
         )
         interval = self._sampling.validation_interval
-        steps = range(number * interval, min((number + 1) * interval, self._steps))
+        steps = range(first, min((first // interval + 1) * interval, self._steps))
         batches = [list(range(s * per_step + rank * size, s * per_step + (rank + 1) * size)) for s in steps]
         crops = CropDataset(self._cache, schedule, self._sampling, self._seed, per_step)
         return DataLoader(crops, batch_sampler=batches, num_workers=self._workers)

@@ -25,13 +25,9 @@ class BestWeights(pl.Callback):
         """Keep what saves the network: it is called with the steps done and the validation figures."""
         self._save = save
         self._best = math.inf
-        self._step = 0
 
     def on_train_epoch_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:
         """Compare the figure of the validation that has just ended, and save the network if it is the best."""
-        if trainer.global_step == self._step:
-            return  # Lightning ends the checkpoint's epoch once more after resuming, without validating
-        self._step = trainer.global_step
         figures = validation_figures(trainer)
         value = figures.get(pl_module.monitor.removeprefix("validation/"))
         if value is None or not math.isfinite(value):
@@ -43,12 +39,12 @@ class BestWeights(pl.Callback):
             self._save(trainer.global_step, figures)
 
     def state_dict(self) -> dict[str, Any]:
-        """What a checkpoint stores: the best figure and the step of the last validation."""
-        return {"best": self._best, "step": self._step}
+        """What a checkpoint stores."""
+        return {"best": self._best}
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         """Take up what a checkpoint stored."""
-        self._best, self._step = state_dict["best"], state_dict["step"]
+        self._best = state_dict["best"]
 
 
 class RunProgress(pl.Callback):
@@ -90,7 +86,7 @@ class RunProgress(pl.Callback):
     def on_train_epoch_end(self, trainer: pl.Trainer, pl_module: StereoTask) -> None:  # noqa: ARG002
         """Print the figures of a validation."""
         figures = "  ".join(f"{name} {value:.4g}" for name, value in validation_figures(trainer).items())
-        if not figures:  # as when Lightning ends the checkpoint's epoch once more after resuming
+        if not figures:  # where there are no validation frames
             return
         self._console.print(
             f"{self._title} step {trainer.global_step}  {figures}", highlight=False, soft_wrap=True

@@ -52,7 +52,8 @@ class TrainingRequest:
     """`joint` only: the refinement to train through, with the paper's quadratic gradient term; None takes the default
     parameters."""
     resume: bool = False
-    """Continue from the last checkpoint as if never interrupted; without a checkpoint the run starts anew."""
+    """Continue from the last checkpoint as if never interrupted, or with more `steps` than before; without a checkpoint
+    the run starts anew."""
     steps: int | None = None
     """Optimizer steps, the preset's by default. All schedules are scaled to them."""
     seed: int = 0
@@ -60,7 +61,8 @@ class TrainingRequest:
     workers: int = 0
     """Processes that prepare crops. Results do not depend on their number."""
     device: str = "auto"
-    """`auto`, `cpu`, `cuda`, `cuda:1`, ...; under torchrun every process takes one device and its share of a step."""
+    """As `training.devices.parse_device` takes it; under torchrun every process takes one device and its
+    share of a step."""
     precision: Precision = "32"
     """Bits of the convolutions."""
     cache_bytes: int = DEFAULT_CACHE_BYTES

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import signal
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,13 +16,22 @@ from datagen.sources.ground_truth import require_ground_truth
 from datagen.sources.stereo_frame import StereoFrame
 from training.data.pipeline import Source, StereoDataModule, open_sources
 from training.data.pseudo_labels import with_pseudo_labels
+from training.data.worker_errors import plain_worker_errors
 from training.runs.building import BuiltTask, build_task
 from training.runs.callbacks import BestWeights, RunProgress
-from training.runs.checkpoints import WholeCheckpoints, last_checkpoint
+from training.runs.checkpoints import RunCheckpoints, WholeCheckpoints
+from training.runs.continuation import describe_continuation
+from training.runs.interruption import Interruption
 from training.runs.model_card import write_model_card
 from training.runs.provenance import code_revision
 from training.runs.request import RunPlan, TrainingRequest, plan_run
-from training.runs.run_folder import CHECKPOINT, claim_run_folder, only_writer, written_networks
+from training.runs.run_folder import (
+    Continuation,
+    checkpoint_path,
+    claim_run_folder,
+    only_writer,
+    written_networks,
+)
 from training.runs.weights import TrainingSummary, read_summary, save_weights
 
 
@@ -45,17 +53,23 @@ def train(request: TrainingRequest) -> TrainingSummary:
     with (
         only_writer(request.out, request.task),
         _quiet_lightning(),
-        _interruptible(),
+        Interruption() as interruption,
         torch.random.fork_rng(),
+        plain_worker_errors(),
     ):
         # Before any frame is decoded, which takes a while.
-        checkpoint = claim_run_folder(request.out, request.task, request.resume, plan.settings(sources))
+        continued = claim_run_folder(request.out, request.task, request.resume, plan.settings(sources))
         module = StereoDataModule(
             sources, held_out, plan.preset, plan.steps, request.seed, request.workers, request.cache_bytes
         )
         torch.manual_seed(request.seed)
         built = build_task(plan, module)
-        trainer = _trainer(plan, _callbacks(plan, built, _summary_of(plan, sources), _remarks(plan, module)))
+        callbacks = _callbacks(plan, built, _summary_of(plan, sources), interruption)
+        if request.progress:
+            remarks = _remarks(plan, module, continued)
+            callbacks.append(RunProgress(f"{request.task} ({plan.preset_name})", remarks))
+        checkpoint = None if continued is None else continued.checkpoint
+        trainer = _trainer(plan, callbacks)
         trainer.fit(built.task, module, ckpt_path=checkpoint, weights_only=True)
         trainer.strategy.barrier()  # the first process writes what the others read now
     return read_summary(request.out, written_networks(request.task)[0])
@@ -86,19 +100,21 @@ def _summary_of(plan: RunPlan, sources: Sequence[Source]) -> TrainingSummary:
     )
 
 
-def _remarks(plan: RunPlan, module: StereoDataModule) -> list[str]:
-    """What is worth saying about the data sets before the run begins."""
+def _remarks(plan: RunPlan, module: StereoDataModule, continued: Continuation | None) -> list[str]:
+    """What is worth saying before the run begins: of the data sets, and of where it goes on."""
     shares = zip(plan.request.data, module.impossible_shares(), strict=True)
-    return [f"{location}: {share}" for (location, _), share in shares if share]
+    remarks = [f"{location}: {share}" for (location, _), share in shares if share]
+    if continued is not None:
+        note = describe_continuation(plan.preset, plan.steps, continued)
+        remarks.append(f"{plan.request.task} ({plan.preset_name}): {note}")
+    return remarks
 
 
 def _callbacks(
-    plan: RunPlan, built: BuiltTask, summary: TrainingSummary, remarks: Sequence[str]
+    plan: RunPlan, built: BuiltTask, summary: TrainingSummary, interruption: Interruption
 ) -> list[pl.Callback]:
-    callbacks = [BestWeights(_saver(plan, built, summary)), last_checkpoint(plan.logs / CHECKPOINT)]
-    if plan.request.progress:
-        callbacks.append(RunProgress(f"{plan.request.task} ({plan.preset_name})", remarks))
-    return callbacks
+    checkpoint = checkpoint_path(plan.request.out, plan.request.task)
+    return [BestWeights(_saver(plan, built, summary)), RunCheckpoints(checkpoint, interruption)]
 
 
 def _saver(
@@ -146,19 +162,3 @@ def _quiet_lightning() -> Iterator[None]:
             yield
     finally:
         logger.setLevel(level)
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let an interruption out as the KeyboardInterrupt it was.
-
-    Lightning turns it into SystemExit, and ignores further ones.
-    """
-    before = signal.getsignal(signal.SIGINT)
-    try:
-        yield
-    except SystemExit as end:
-        if not isinstance(end.__context__, KeyboardInterrupt):
-            raise
-        signal.signal(signal.SIGINT, before)
-        raise end.__context__ from None

@@ -80,10 +80,18 @@ class StereoTask(pl.LightningModule):
         """The network that is validated and saved: the one trained, or its moving average."""
         return self.network if self._averaged is None else self._averaged.module
 
-    def on_train_batch_end(self, outputs: Any, batch: StereoBatch, batch_idx: int) -> None:  # noqa: ARG002
-        """Update the moving average."""
+    def optimizer_step(self, *arguments: Any, **options: Any) -> None:
+        """Change the weights, and with them their moving average, before a checkpoint can be written."""
+        super().optimizer_step(*arguments, **options)
         if self._averaged is not None:
             self._averaged.update_parameters(self.network)
+
+    def on_train_start(self) -> None:
+        """Take the learning rate from the schedule, which a resumed run may have for more steps than before."""
+        for scheduler in self.trainer.lr_scheduler_configs:
+            rate = self._learning_rate_factor(scheduler.scheduler.last_epoch)
+            for group in scheduler.scheduler.optimizer.param_groups:
+                group["lr"] = group["initial_lr"] * rate
 
     @abstractmethod
     def loss(self, batch: StereoBatch) -> Tensor:
@@ -125,7 +133,9 @@ class StereoTask(pl.LightningModule):
         "Rethinking 'Batch' in BatchNorm", 2021).
         """
         data = self.trainer.datamodule
-        batches = data.block(self.trainer.current_epoch, self.trainer.global_rank, self.trainer.world_size)
+        interval = self.preset.validation_interval
+        first = self.global_step // interval * interval
+        batches = data.block(first, self.trainer.global_rank, self.trainer.world_size)
         momenta = [norm.momentum for norm in norms]
         for norm in norms:
             norm.reset_running_stats()
@@ -144,8 +154,8 @@ class StereoTask(pl.LightningModule):
         loss = self.loss(batch)
         if not torch.isfinite(loss):
             raise TrainingError(
-                f"the loss of step {self.global_step} is {loss.item()}, so training stopped; the last checkpoint "
-                f"is whole, and a smaller learning rate or gradient clipping usually helps"
+                f"the loss of step {self.global_step} is {loss.item()}, so training stopped; "
+                "a smaller learning rate or gradient clipping usually helps"
             )
         self.log("train/loss", loss.detach(), batch_size=len(batch.left), sync_dist=True)
         self.log("train/learning_rate", self.optimizers().param_groups[0]["lr"])
@@ -172,6 +182,9 @@ class StereoTask(pl.LightningModule):
                 f"frame{batch_idx}", picture, self.global_step, dataformats="HWC"
             )
 
+    def _learning_rate_factor(self, step: int) -> float:
+        return learning_rate_factor(self.preset.optimizer, step, self.steps, self.preset.steps)
+
     def configure_optimizers(self) -> Any:
         """Adam and the schedule of its learning rate, as Lightning takes them."""
         config = self.preset.optimizer
@@ -190,7 +203,7 @@ class StereoTask(pl.LightningModule):
             fused=not self.mixed_precision,
         )
         scheduler = torch.optim.lr_scheduler.LambdaLR(
-            optimizer, lambda step: learning_rate_factor(config, step, self.steps, self.preset.steps)
+            optimizer, lambda step: self._learning_rate_factor(step)
         )
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": scheduler, "interval": "step"}}
 

@@ -41,8 +41,8 @@ def module_of(folders: tuple[Path, Path], seed: int = 0, **options: int) -> Ster
     return StereoDataModule(sources, validation, PRESET, PRESET.steps, seed, **options)
 
 
-def lefts(module: StereoDataModule, block: int = 0, rank: int = 0, processes: int = 1) -> torch.Tensor:
-    return torch.cat([batch.left for batch in module.block(block, rank, processes)])
+def lefts(module: StereoDataModule, first: int = 0, rank: int = 0, processes: int = 1) -> torch.Tensor:
+    return torch.cat([batch.left for batch in module.block(first, rank, processes)])
 
 
 def test_draws_do_not_depend_on_workers_or_cache(folders: tuple[Path, Path]) -> None:
@@ -65,8 +65,9 @@ def test_two_processes_share_the_draws_of_one_with_double_batch(folders: tuple[P
 
 def test_blocks_divide_the_run(folders: tuple[Path, Path]) -> None:
     module = module_of(folders)
-    assert [len(module.block(number)) for number in range(3)] == [5, 5, 2]
-    crops = torch.cat([lefts(module, number) for number in range(3)])
+    assert [len(module.block(first)) for first in (0, 5, 10)] == [5, 5, 2]
+    crops = torch.cat([lefts(module, first) for first in (0, 5, 10)])
+    torch.testing.assert_close(lefts(module, 7), lefts(module, 5)[2 * 2 :], rtol=0, atol=0)
     assert len(torch.unique(crops.flatten(1), dim=0)) == 24
 
 

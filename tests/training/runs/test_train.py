@@ -24,7 +24,10 @@ from training.errors import TrainingError
 from training.networks import DispNetConfig
 from training.prediction.predictor import StereoPredictor
 from training.presets import Preset, RegressorPreset, find_preset
+from training.runs.checkpoints import checkpoint_step
+from training.runs.continuation import describe_continuation
 from training.runs.hardware import Precision
+from training.runs.run_folder import Continuation
 from training.runs.weights import read_summary
 from training.tasks import GradNetTask, StereoTask
 
@@ -130,7 +133,7 @@ def test_resumed_equals_uninterrupted(task: str, data: Path, run: Path, tmp_path
     train_quietly(task, [(data, 1.0)], whole, preset, steps=11, seed=3)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(StereoTask, "on_train_batch_end", _stop_after(6, _PowerCut))
+        patch.setattr(StereoTask, "on_train_batch_end", _stop_after(6, _PowerCut), raising=False)
         with pytest.raises(_PowerCut):
             train_quietly(task, [(data, 1.0)], broken, preset, steps=11, seed=3)
     train_quietly(task, [(data, 1.0)], broken, preset, steps=11, seed=3, resume=True)
@@ -160,10 +163,84 @@ def _stop_after(steps: int, why: type[BaseException]) -> object:
     return on_train_batch_end
 
 
+def _interrupted_after(
+    steps: int, patch: pytest.MonkeyPatch, number: signal.Signals = signal.SIGTERM
+) -> None:
+    """Have the signal sent within the step after so many."""
+
+    def on_train_batch_start(self: StereoTask, *arguments: object) -> None:
+        if self.global_step == steps:
+            signal.raise_signal(number)
+        start(self, *arguments)  # type: ignore[arg-type]
+
+    start = StereoTask.on_train_batch_start
+    patch.setattr(StereoTask, "on_train_batch_start", on_train_batch_start)
+
+
+def _same_run(first: Path, second: Path, task: str) -> None:
+    """Weights, description and logged figures are the same."""
+    expected, got = weights(first, task), weights(second, task)
+    assert all(torch.equal(expected[name], got[name]) for name in expected)
+    assert (first / f"{task}.json").read_text() == (second / f"{task}.json").read_text()
+    assert scalars(first, task, "validation/epe") == scalars(second, task, "validation/epe")
+
+
+@pytest.mark.parametrize(
+    ("step", "kept"), [(1, 2), (3, 4), (5, 6), (8, 9), (10, 8)], ids=lambda value: str(value)
+)
+def test_an_interruption_keeps_the_step_under_way(step: int, kept: int, data: Path, tmp_path: Path) -> None:
+    """SIGTERM in any step, the last before a validation too; only in the last of all it is the checkpoint before."""
+    preset, options = quick_regressor(fixed_statistics=0.4), {"steps": 11, "changes": {"ema_decay": 0.9}}
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    train_quietly("regressor", [(data, 1.0)], whole, preset, **options)
+    with pytest.MonkeyPatch.context() as patch:
+        _interrupted_after(step, patch)
+        with pytest.raises(KeyboardInterrupt):
+            train_quietly("regressor", [(data, 1.0)], broken, preset, **options)
+    assert checkpoint_step(broken / "logs" / "regressor" / "last.ckpt") == kept
+    train_quietly("regressor", [(data, 1.0)], broken, preset, resume=True, **options)
+    _same_run(whole, broken, "regressor")
+    assert scalars(whole, "regressor", "train/loss") == scalars(broken, "regressor", "train/loss")
+
+
+def test_a_validation_that_was_interrupted_is_done_again(data: Path, tmp_path: Path) -> None:
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    train_quietly("regressor", [(data, 1.0)], whole, quick_regressor(), steps=6)
+    with pytest.MonkeyPatch.context() as patch:
+        validate = StereoTask.validation_step
+        patch.setattr(
+            StereoTask,
+            "validation_step",
+            lambda *arguments: (validate(*arguments), signal.raise_signal(signal.SIGINT))[0],
+        )
+        with pytest.raises(KeyboardInterrupt):
+            train_quietly("regressor", [(data, 1.0)], broken, quick_regressor(), steps=6)
+    assert not (broken / "regressor.safetensors").exists()
+    assert checkpoint_step(broken / "logs" / "regressor" / "last.ckpt") == 4
+    train_quietly("regressor", [(data, 1.0)], broken, quick_regressor(), steps=6, resume=True)
+    _same_run(whole, broken, "regressor")
+
+
+def test_killed_between_two_validations_a_run_goes_on_from_the_last_minutes(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Checkpoints are written by the clock too; here after every step."""
+    monkeypatch.setattr("training.runs.checkpoints.CHECKPOINT_EVERY_S", 0.0)
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    train_quietly("regressor", [(data, 1.0)], whole, quick_regressor(), steps=11)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(StereoTask, "on_train_batch_end", _stop_after(7, _PowerCut), raising=False)
+        with pytest.raises(_PowerCut):
+            train_quietly("regressor", [(data, 1.0)], broken, quick_regressor(), steps=11)
+    assert checkpoint_step(broken / "logs" / "regressor" / "last.ckpt") == 7
+    train_quietly("regressor", [(data, 1.0)], broken, quick_regressor(), steps=11, resume=True)
+    _same_run(whole, broken, "regressor")
+
+
 def test_an_interruption_comes_out_as_one_and_the_next_is_heard_too(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(StereoTask, "on_train_batch_end", _stop_after(6, KeyboardInterrupt))
+    monkeypatch.setattr(StereoTask, "on_train_batch_end", _stop_after(6, KeyboardInterrupt), raising=False)
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     with pytest.raises(KeyboardInterrupt):
         train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=11)
@@ -284,7 +361,7 @@ def test_a_run_is_resumed_whatever_its_data_set_is_called(
     (tmp_path / "regressor.safetensors").unlink()
     again = [(data.name, 1.0)]
     train_quietly("regressor", again, tmp_path, quick_regressor(), steps=5, resume=True)
-    with pytest.raises(TrainingError, match=r"with another data \(.*1.0.*, not .*2.0.*\), so it cannot"):
+    with pytest.raises(TrainingError, match=r"with another data\.1\.weight \(1\.0, not 2\.0\), so it cannot"):
         train_quietly("regressor", [(data, 2.0)], tmp_path, quick_regressor(), steps=5, resume=True)
 
 
@@ -295,6 +372,38 @@ def test_killed_before_the_first_checkpoint(data: Path, tmp_path: Path) -> None:
     (tmp_path / "logs" / "regressor" / "last.ckpt").unlink()
     train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=2, resume=True)
     assert all(torch.equal(before[name], tensor) for name, tensor in weights(tmp_path, "regressor").items())
+
+
+def test_what_an_unfinished_run_left_is_not_replaced(data: Path, tmp_path: Path) -> None:
+    """A forgotten --resume does not cost the hours that are in a checkpoint."""
+    with pytest.MonkeyPatch.context() as patch:
+        _interrupted_after(1, patch)
+        with pytest.raises(KeyboardInterrupt):
+            train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=6)
+    with pytest.raises(
+        TrainingError, match="already holds a checkpoint of step 2 of a regressor; continue it"
+    ):
+        train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=6)
+
+
+def test_a_run_may_go_on_for_longer(data: Path, tmp_path: Path) -> None:
+    """Finished after 6 steps, between two validations, it goes on to 11 in the blocks of a run of 11."""
+    train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=6)
+    train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=11, resume=True)
+    assert checkpoint_step(tmp_path / "logs" / "regressor" / "last.ckpt") == 11
+    assert set(scalars(tmp_path, "regressor", "validation/epe")) == {3, 5, 7, 10}  # counted from 0
+
+
+def test_more_steps_are_said_with_what_they_change() -> None:
+    continued = Continuation(Path("last.ckpt"), 600, 1000)
+    preset = quick_regressor(steps=1000, fixed_statistics=0.2, curriculum=0.5)
+    assert describe_continuation(preset, 1000, continued) == "goes on from step 600 of 1000"
+    said = describe_continuation(preset, 2000, continued)
+    assert said.startswith("goes on from step 600 of 2000, 1000 before; the learning rate is ")
+    assert (
+        "; BatchNorm is fixed from step 1600 instead of 800; the curriculum ends at step 1000 instead of 500;"
+        in said
+    )
 
 
 def write_kitti(root: Path, count: int) -> None:
@@ -391,14 +500,24 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
         train_quietly("confnet", source, tmp_path / "empty", quick("confnet"))
     with pytest.raises(TrainingError, match="already holds a regressor; continue it with --resume"):
         train_quietly("regressor", source, run, quick_regressor(), steps=6)
-    with pytest.raises(TrainingError, match=r"started with another steps \(6, not 7\)"):
-        train_quietly("regressor", source, run, quick_regressor(), steps=7, resume=True)
+    with pytest.raises(
+        TrainingError, match=r"started with 6 steps; it can be continued with more, not with 5"
+    ):
+        train_quietly("regressor", source, run, quick_regressor(), steps=5, resume=True)
+    slower = quick_regressor()
+    slower = replace(slower, optimizer=replace(slower.optimizer, learning_rate=1e-5))
+    with pytest.raises(TrainingError) as refusal:
+        train_quietly("regressor", source, run, slower, steps=6, resume=True)
+    rates = f"{quick_regressor().optimizer.learning_rate}, not 1e-05"
+    assert f"started with another preset.optimizer.learning_rate ({rates})" in str(refusal.value)
+    with pytest.raises(TrainingError, match=r"with another data\.2 \(null, not "):
+        train_quietly("regressor", source * 2, run, quick_regressor(), steps=6, resume=True)
     with (
         alone(run / "logs" / "regressor" / ".lock"),
         pytest.raises(TrainingError, match="another process is training its regressor right now"),
     ):
         train_quietly("regressor", source, run, quick_regressor(), steps=6, resume=True)
-    with pytest.raises(TrainingError, match="no device 'abacus'"):
+    with pytest.raises(TrainingError, match="no device 'abacus'; it is called auto"):
         train_quietly("regressor", source, tmp_path / "device", quick_regressor(), device="abacus")
     with pytest.raises(
         TrainingError, match=r"frames of 128x64 are smaller than the 320x128 .* \(--crop 128x64\)"
