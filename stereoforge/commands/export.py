@@ -56,7 +56,7 @@ class Export:
         ]
         if not sets:
             raise CommandError(f"{self.data}: has no finished scene")
-        options = {
+        options: dict[str, dict[str, int | None]] = {
             "webdataset": {"frames_per_shard": self.frames_per_shard},
             "kitti": {"lidar_beams": self.lidar_beams},
         }
