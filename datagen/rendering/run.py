@@ -120,7 +120,7 @@ def render_dataset(
                 *scene,
                 device,
                 executor.threads,
-                manifest_digest(tree, *scene) if scene in present else None,
+                replaces=manifest_digest(tree, *scene) if scene in present else None,
             )
             for scene in missing
         ]

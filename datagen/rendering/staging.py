@@ -110,7 +110,9 @@ def _clear(tree: Tree, area: Path) -> None:
         locked(area / COMMITS),
     ):  # Somebody may have removed the whole data set.
         for attempt in sorted(path for path in area.iterdir() if path.is_dir()):
-            finish_commit(tree, attempt)
+            with suppress(ValueError, KeyError):  # After a power cut files may be empty: nothing to go by.
+                if finished := finish_commit(tree, attempt):
+                    release(tree, *finished)
         remove_folder(area)
 
 
@@ -135,15 +137,19 @@ def commit(tree: Tree, staged: Path, split: str, scene: int, replaces: str | Non
     finish_commit(tree, staged.parent)
 
 
-def finish_commit(tree: Tree, attempt: Path) -> None:
-    """Move what is left of a staged scene, if its commit was begun and no other attempt has been faster."""
+def finish_commit(tree: Tree, attempt: Path) -> SceneKey | None:
+    """Move what is left of a staged scene, if its commit was begun and no other attempt has been faster.
+
+    Returns (split, number) of the scene if it was moved, else None. Raises ValueError or KeyError for a record or a
+    manifest that is damaged.
+    """
     path = attempt / COMMIT_RECORD
     if not path.is_file():
-        return
+        return None
     record = json.loads(path.read_text())
     split, scene, replaces = record["split"], record["scene"], record["replaces"]
     if manifest_digest(tree, split, scene) != replaces:
-        return
+        return None
     staged = attempt / SCENE
     manifest = Layout(staged).manifest(split, scene)
     files = sorted(file for file in staged.rglob("*") if file.is_file() and file != manifest)
@@ -152,10 +158,11 @@ def finish_commit(tree: Tree, attempt: Path) -> None:
         name = source.relative_to(staged).as_posix()
         if not (replaces and _is_same(tree, name, source)):
             tree.adopt(source, name)
-    for name in _outdated(tree, manifest.relative_to(staged).as_posix(), read_manifest(manifest)):
+    place = manifest.relative_to(staged).as_posix()
+    for name in _outdated(tree, place, read_manifest(manifest)) if replaces else ():
         tree.remove(name)
-    tree.adopt(manifest, manifest.relative_to(staged).as_posix())
-    release(tree, split, scene)
+    tree.adopt(manifest, place)
+    return split, scene
 
 
 def begun_before(tree: Tree, splits: Iterable[str]) -> set[SceneKey]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -97,3 +98,20 @@ def test_the_slower_of_two_attempts_changes_nothing(tmp_path: Path) -> None:
                 write_scene(staged, text)
                 commit(tree, staged, "train", 0, replaces)
     assert Layout(root).file("disparity", "train", 0, "left", 6).read_text() == "first"
+
+
+@pytest.mark.parametrize("damaged", ["commit.json", "scene/manifest/TRAIN/A/0000.json"])
+def test_a_record_that_a_power_cut_emptied_stops_no_run(tmp_path: Path, damaged: str) -> None:
+    root, tree = tmp_path / "set", LocalTree(tmp_path / "set")
+    write_scene(root, "old")
+    before = content(root)
+    attempt = root / STAGING_FOLDER / "run" / "train-0-x"
+    write_scene(attempt / "scene", "new")
+    digest = manifest_digest(tree, "train", 0)
+    (attempt / "commit.json").write_text(json.dumps({"split": "train", "scene": 0, "replaces": digest}))
+    (attempt / damaged).write_text("")
+    with staging_area(tree):
+        pass
+    assert not (root / STAGING_FOLDER).exists()
+    assert content(root).keys() == before.keys()
+    assert Layout(root).manifest("train", 0).read_text() == before["manifest/TRAIN/A/0000.json"]

@@ -9,14 +9,18 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from datagen import read_recipe, render_dataset
+from datagen import Recipe, read_recipe, render_dataset
 from datagen.dataset.layout import Layout
 from datagen.errors import MachineError
 from datagen.executors import Failure
+from datagen.recipe.assets import prepare_mesh
 from datagen.rendering.quarantine import put_in_quarantine, quarantined_scenes
 from datagen.verify.repair import repair_dataset
+from scenes import FAMILIES
+from scenes.user_assets.pool import Asset, AssetPool
 from stereoforge.cli import main
 from stereoforge_kit.files import LocalTree
 from tests.datagen.sabotage import ONE_WORKER, RECIPE, Sabotage, hashes
@@ -94,15 +98,15 @@ def damage(path: Path) -> None:
 def with_meshes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A rendered scene with a mesh of the user's; not to be changed."""
     folder = tmp_path_factory.mktemp("own")
-    meshes = folder / "meshes"
-    meshes.mkdir()
-    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
-    for number in range(3):  # Enough for one of them to fall to the train split.
-        (meshes / f"{number}.obj").write_text(f"# {number}\n{corners}f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
-    words = ["--scenes", "1", "--size", "64x36", "--samples", "1", "--workers", "1", "--meshes", str(meshes)]
-    with pytest.raises(SystemExit) as end:
-        main(["render", *words, "--out", str(folder / "set")])
-    assert end.value.code == 0
+    original = folder / "mine.obj"
+    original.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    asset = Asset("mine.obj", f"{0:064x}")  # By its first digits a mesh of the train split.
+    world = FAMILIES["flying_things"].config(width=64, height=36)
+    recipe = Recipe(world, {"train": 1}, seed=1, samples=1, assets=AssetPool(meshes=(asset,)))
+    render_dataset(replace(recipe, scenes={}), folder / "set")
+    (folder / "set/assets").mkdir()
+    np.savez(folder / f"set/assets/{asset.sha256}.npz", **prepare_mesh(original))
+    assert render_dataset(recipe, folder / "set", executor=ONE_WORKER).failures == ()
     return folder / "set"
 
 
