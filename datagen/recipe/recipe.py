@@ -30,6 +30,8 @@ MAX_RECIPE_BYTES = 1 << 20
 MAX_RECIPE_DEPTH = 32
 """Deepest nesting that a recipe file may have."""
 
+LONGEST_SETTING = 80
+"""Characters of a setting in a message."""
 LEAST_SIDE_PX = 4
 """Blender clamps the sides of a picture to this."""
 
@@ -241,12 +243,20 @@ def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
     for key in sorted(set(before) | set(after), key=lambda key: (key != "world.family", key)):
         if before.get(key) != after.get(key):
             raise DatasetError(
-                f"{folder} was rendered with {key} {before.get(key)}, not {after.get(key)}: "
+                f"{folder} was rendered with {key} {_brief(before.get(key))}, not {_brief(after.get(key))}: "
                 "use the same settings to finish or extend it, or another folder"
             )
     splits = [split for split in SPLITS if split in existing.scenes or split in wanted.scenes]
     counts = {split: max(existing.scenes.get(split, 0), wanted.scenes.get(split, 0)) for split in splits}
     return replace(existing, scenes=counts)
+
+
+def _brief(value: Any) -> str:
+    """A setting for a sentence: of many user assets only how many they are."""
+    text = str(value)
+    if len(text) <= LONGEST_SETTING:
+        return text
+    return f"({len(value)} entries)" if isinstance(value, list) else f"{text[: LONGEST_SETTING - 3]}..."
 
 
 def _flat(data: Any, prefix: str = "") -> dict[str, Any]:
