@@ -49,11 +49,13 @@ class PictureKindError(FormatError):
     """A picture that is whole, but of a kind or a size that cannot be used."""
 
 
-def read_picture(path: Path | str) -> NDArray[np.uint8]:
+def read_picture(path: Path | str, longest_px: int | None = None) -> NDArray[np.uint8]:
     """Read an image as (H, W, 3) uint8 RGB, upright.
 
     The Exif orientation is applied. Grey is repeated, CMYK and palettes are converted. What is transparent shows white
     behind it. 16 bits are scaled to 8; where no value is above 4095 the picture has 12 bits, and these are scaled to 8.
+    A JPEG file larger than `longest_px`, where that is given, is decoded to a half, a quarter or an eighth of its size,
+    as long as no side falls below it.
 
     Raises FormatError for a file that is missing or damaged, PictureKindError for one that holds several pictures, or
     numbers that are no colours, or more pixels than a picture has.
@@ -66,7 +68,7 @@ def read_picture(path: Path | str) -> NDArray[np.uint8]:
     >>> image.tolist()
     [[[7, 7, 7], [200, 200, 200]]]
     """
-    pixels = _decode(Path(path))
+    pixels = _decode(Path(path), longest_px)
     return _as_color(pixels, _full_scale(pixels))
 
 
@@ -119,7 +121,7 @@ def read_pnm(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
     return values.astype(np.uint8) if kind.itemsize == 1 else values.astype(np.uint16)
 
 
-def _decode(path: Path) -> Pixels:
+def _decode(path: Path, longest_px: int | None = None) -> Pixels:
     """The numbers of any picture, upright: (H, W) grey or (H, W, C) grey with alpha, RGB, or RGB with alpha."""
     data = read_bounded(path)
     if data[:2] in _FLOAT_MAPS:
@@ -129,7 +131,7 @@ def _decode(path: Path) -> Pixels:
         return _turned(pixels, _png_orientation(data)) if b"eXIf" in data else pixels
     if data[:2] in (b"P5", b"P6"):
         return read_pnm(path)
-    return _decode_with_pillow(path, data)
+    return _decode_with_pillow(path, data, longest_px)
 
 
 def _png_orientation(data: bytes) -> int:
@@ -141,13 +143,17 @@ def _turned(pixels: Pixels, orientation: int) -> Pixels:
     return np.ascontiguousarray(_TURNS[orientation](pixels)) if orientation in _TURNS else pixels
 
 
-def _decode_with_pillow(path: Path, data: bytes) -> Pixels:
+def _decode_with_pillow(path: Path, data: bytes, longest_px: int | None) -> Pixels:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Of odd metadata, and of sizes, which are checked here.
             if data[:4] in _TIFF and _is_deep(path, data):
                 return _decode_deep_tiff(path, data)
             with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+                if longest_px is not None:
+                    image.draft(
+                        None, (longest_px, longest_px)
+                    )  # JPEG decodes to a half, a quarter, an eighth.
                 _check_kind(path, image)
                 image.load()
                 return _as_array(path, ImageOps.exif_transpose(image))

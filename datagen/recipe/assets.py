@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterable
-from contextlib import closing
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Literal, NamedTuple
+from zipfile import is_zipfile
 
 import cv2
 import numpy as np
@@ -22,15 +25,15 @@ import trimesh
 from numpy.typing import NDArray
 
 from datagen.dataset.layout import SPLITS
+from datagen.dataset.shards import cache_folder
 from datagen.errors import DatasetError, MachineError
 from datagen.executors import LocalExecutor, WorkerPolicy
-from datagen.formats.limits import check_image_size
 from datagen.formats.picture import read_picture
 from scenes.geometry.building import solid
 from scenes.user_assets.pool import Asset, AssetPool
 from stereoforge_kit.errors import InputError
-from stereoforge_kit.files import walk_files
-from stereoforge_kit.processes import Limits
+from stereoforge_kit.files import replacing, temporary_folder, walk_files
+from stereoforge_kit.processes import Limits, available_memory_bytes
 
 ASSET_KINDS = ("meshes", "textures", "environments")
 """The fields of `AssetPool` that hold files, named as their flags are."""
@@ -42,6 +45,8 @@ Y_UP = (".glb",)
 UpAxis = Literal["auto", "y", "z"]
 REMARK = "remark"
 """What a preparer returns beside the arrays where it changed something that the user should know."""
+PREPARATION = 1
+"""Number of what the preparers do: files that another version prepared are prepared anew."""
 MAX_FILE_BYTES = 500 << 20
 MAX_TRIANGLES = 300_000
 MAX_SIDE_PX = 4096
@@ -51,6 +56,11 @@ MEAN_LUMINANCE = 0.5
 MESH_LIMITS = Limits(timeout_s=60.0, memory_bytes=1 << 30)
 PICTURE_LIMITS = Limits(timeout_s=60.0, memory_bytes=4 << 30)
 """An environment of 16384 x 8192 pixels takes 1.6 GB before it is made smaller."""
+
+
+Preparer = Callable[[Path], dict[str, NDArray[np.generic]]]
+ImportProgress = Callable[[str, int, int], None]
+"""Told of a kind of files how many are done, and how many there are."""
 
 
 @dataclass(frozen=True)
@@ -71,17 +81,20 @@ def import_assets(
     textures: Path | None = None,
     environments: Path | None = None,
     up_axis: UpAxis = "auto",
+    progress: ImportProgress | None = None,
 ) -> ImportedAssets:
-    """Prepare all usable files below the given folders into `store`.
+    """Prepare all usable files below the given folders into `store`, as many at a time as there are cores.
 
-    A mesh that is turned upright has another name in the store than the same file as it is.
+    What the store has is not prepared again, so an interrupted import goes on where it was, and a folder that has grown
+    costs its new files. A mesh that is turned upright has another name in the store than the same file as it is.
 
     Args:
-        store: The folder for the prepared files; made if need be.
+        store: The folder for the prepared files; made if need be. It may hold files of other imports too.
         meshes: A folder of OBJ, PLY, GLB and STL files.
         textures: A folder of PNG, JPEG, TIFF, WebP and BMP files.
         environments: A folder of equirectangular Radiance HDR and OpenEXR files.
         up_axis: Which axis of the meshes points up, "y" or "z"; "auto" for what is usual in their format (`Y_UP`).
+        progress: Called with how many files of a kind are done, how many there are, and the kind.
 
     Raises:
         DatasetError: For a folder that is missing or has no usable file of its kind.
@@ -91,20 +104,43 @@ def import_assets(
     skipped: list[str] = []
     remarks: list[str] = []
     kinds: list[tuple[Asset, ...]] = []
-    for folder, suffixes, prepare, limits in (
-        (meshes, MESH_SUFFIXES, partial(prepare_mesh, up_axis=up_axis), MESH_LIMITS),
-        (textures, TEXTURE_SUFFIXES, prepare_texture, PICTURE_LIMITS),
-        (environments, ENVIRONMENT_SUFFIXES, prepare_environment, PICTURE_LIMITS),
+    for kind, folder, suffixes, prepare, limits in (
+        ("meshes", meshes, MESH_SUFFIXES, partial(prepare_mesh, up_axis=up_axis), MESH_LIMITS),
+        ("textures", textures, TEXTURE_SUFFIXES, prepare_texture, PICTURE_LIMITS),
+        ("environments", environments, ENVIRONMENT_SUFFIXES, prepare_environment, PICTURE_LIMITS),
     ):
-        kinds.append(
-            ()
-            if folder is None
-            else _import_folder(
-                folder, suffixes, prepare, limits, store, skipped, remarks, partial(_identity, up_axis)
-            )
-        )
+        if folder is None:
+            kinds.append(())
+            continue
+        report = None if progress is None else partial(progress, kind)
+        work = _FolderImport(suffixes, prepare, limits, store, partial(_identity, up_axis), report)
+        kinds.append(work.run(folder, skipped, remarks))
     pool = AssetPool(meshes=kinds[0], textures=kinds[1], environments=kinds[2])
     return ImportedAssets(pool, tuple(skipped), tuple(remarks))
+
+
+@contextmanager
+def prepared_assets_folder() -> Iterator[Path]:
+    """A folder of prepared files that stays: in the cache folder, or a temporary one where that cannot be written."""
+    folder = cache_folder() / f"assets-{PREPARATION}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        with temporary_folder() as temporary:
+            yield temporary
+    else:
+        yield folder
+
+
+def copy_prepared(pool: AssetPool, store: Path, target: Path) -> None:
+    """Copy the prepared files of a pool from one store to another, each whole or not at all, unless they are there."""
+    target.mkdir(parents=True, exist_ok=True)
+    for asset in (*pool.meshes, *pool.textures, *pool.environments):
+        name = f"{asset.sha256}.npz"
+        if not is_zipfile(target / name):
+            with replacing(target / name) as temporary:
+                shutil.copyfile(store / name, temporary)
 
 
 def describe_splits(pool: AssetPool) -> list[str]:
@@ -130,9 +166,6 @@ def require_assets(pool: AssetPool, splits: Iterable[str]) -> None:
                 )
 
 
-Preparer = Callable[[Path], dict[str, NDArray[np.generic]]]
-
-
 def _identity(up_axis: UpAxis, path: Path) -> bytes:
     """What tells a prepared file from another one of the same original."""
     return b"y up" if path.suffix.lower() in MESH_SUFFIXES and is_y_up(path, up_axis) else b""
@@ -145,54 +178,80 @@ class _Outcome(NamedTuple):
     remark: str | None = None
 
 
-def _import_folder(
-    folder: Path,
-    suffixes: tuple[str, ...],
-    prepare: Preparer,
-    limits: Limits,
-    store: Path,
-    skipped: list[str],
-    remarks: list[str],
-    identity: Callable[[Path], bytes] = lambda _: b"",
-) -> tuple[Asset, ...]:
-    if not folder.is_dir():
-        raise DatasetError(f"{folder}: there is no such folder")
-    paths = [path for path in walk_files(folder) if path.suffix.lower() in suffixes]
-    originals: dict[str, Path] = {}
-    for path in paths:
-        if not path.is_file():
-            skipped.append(f"{path}: is no file, or a link to none")
-            continue
-        if path.stat().st_size > MAX_FILE_BYTES:
-            skipped.append(f"{path}: is larger than {MAX_FILE_BYTES >> 20} MB")
-            continue
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256")
-        digest.update(identity(path))
-        originals.setdefault(digest.hexdigest(), path)
-    found: list[Asset] = []
-    one_worker = LocalExecutor(({},), WorkerPolicy(limits, attempts=1))
-    jobs = [(path, store / f"{sha256}.npz") for sha256, path in originals.items()]
-    with closing(one_worker.run(partial(_prepare_file, prepare), jobs)) as outcomes:
-        for outcome in outcomes:
-            path, prepared = outcome.job
-            problem, remark = outcome.result or _Outcome()
-            if outcome.failure is not None:
-                if outcome.failure.kind in ("environment", "disk_full"):
-                    raise MachineError(
-                        f"importing stopped, no file is at fault: {outcome.failure.sentence}"[:300]
-                    )
-                problem = f"cannot be read, {outcome.failure.sentence}"
-            if remark is not None:
-                remarks.append(f"{path}: {remark}")
-            if problem is None:
-                found.append(Asset(path.relative_to(folder).as_posix(), prepared.stem))
+@dataclass(frozen=True)
+class _FolderImport:
+    """How the files of one kind are found and prepared."""
+
+    suffixes: tuple[str, ...]
+    prepare: Preparer
+    limits: Limits
+    store: Path
+    identity: Callable[[Path], bytes] = lambda _: b""
+    report: Callable[[int, int], None] | None = None
+
+    def run(self, folder: Path, skipped: list[str], remarks: list[str]) -> tuple[Asset, ...]:
+        """The usable files of a folder, all in the store. Raises DatasetError if it has none, and MachineError."""
+        if not folder.is_dir():
+            raise DatasetError(f"{folder}: there is no such folder")
+        originals = self._originals(folder, skipped)
+        prepared = {path: self.store / f"{sha256}.npz" for sha256, path in originals.items()}
+        remark_of = {path: _stored_remark(file) for path, file in prepared.items() if is_zipfile(file)}
+        jobs = [(path, file) for path, file in prepared.items() if path not in remark_of]
+        problem_of: dict[Path, str] = {}
+        for done, (path, outcome) in enumerate(self._prepared(jobs), start=1):
+            if outcome.problem is None:
+                remark_of[path] = outcome.remark
             else:
-                skipped.append(f"{path}: {problem}")
-    if not found:
-        reason = f": {skipped[-1]}" if skipped else ""
-        raise DatasetError(f"{folder}: has no usable file among {', '.join(suffixes)}{reason}")
-    return tuple(sorted(found, key=lambda asset: asset.sha256))
+                problem_of[path] = outcome.problem
+            if self.report is not None:
+                self.report(len(prepared) - len(jobs) + done, len(prepared))
+        # In the files' order, since they are done in any.
+        skipped += [f"{path}: {problem_of[path]}" for path in prepared if path in problem_of]
+        if not remark_of:
+            reason = f": {skipped[-1]}" if skipped else ""
+            raise DatasetError(f"{folder}: has no usable file among {', '.join(self.suffixes)}{reason}")
+        remarks += [f"{path}: {remark_of[path]}" for path in prepared if remark_of.get(path)]
+        found = (Asset(path.relative_to(folder).as_posix(), prepared[path].stem) for path in remark_of)
+        return tuple(sorted(found, key=lambda asset: asset.sha256))
+
+    def _originals(self, folder: Path, skipped: list[str]) -> dict[str, Path]:
+        """The files worth preparing by the SHA-256 that names them in the store; of equal ones the first."""
+        originals: dict[str, Path] = {}
+        for path in walk_files(folder):
+            if path.suffix.lower() not in self.suffixes:
+                continue
+            if not path.is_file():
+                skipped.append(f"{path}: is no file, or a link to none")
+            elif path.stat().st_size > MAX_FILE_BYTES:
+                skipped.append(f"{path}: is larger than {MAX_FILE_BYTES >> 20} MB")
+            elif not path.stat().st_size:
+                skipped.append(f"{path}: is empty")
+            else:
+                with path.open("rb") as file:
+                    digest = hashlib.file_digest(file, "sha256")
+                digest.update(self.identity(path))
+                originals.setdefault(digest.hexdigest(), path)
+        return originals
+
+    def _prepared(self, jobs: list[tuple[Path, Path]]) -> Iterator[tuple[Path, _Outcome]]:
+        """The outcome of each file, in any order. Raises MachineError where no file is at fault."""
+        fitting = available_memory_bytes() // (self.limits.memory_bytes or available_memory_bytes())
+        workers = max(1, min(len(jobs), len(os.sched_getaffinity(0)), fitting))
+        executor = LocalExecutor(({},) * workers, WorkerPolicy(self.limits, attempts=1))
+        with closing(executor.run(partial(_prepare_file, self.prepare), jobs)) as outcomes:
+            for outcome in outcomes:
+                failure = outcome.failure
+                if failure is not None and failure.kind in ("environment", "disk_full"):
+                    raise MachineError(f"importing stopped, no file is at fault: {failure.sentence}"[:300])
+                if failure is not None:
+                    yield outcome.job[0], _Outcome(f"cannot be read, {failure.sentence}")
+                else:
+                    yield outcome.job[0], outcome.result or _Outcome()
+
+
+def _stored_remark(prepared: Path) -> str | None:
+    with np.load(prepared, allow_pickle=False) as arrays:
+        return str(arrays[REMARK]) if REMARK in arrays.files else None
 
 
 def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> _Outcome:
@@ -206,7 +265,7 @@ def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> _Outcome:
         return _Outcome(f"cannot be read (it has no {error})")
     except Exception as error:
         return _Outcome(f"cannot be read ({' '.join(str(error).split())[:200] or type(error).__name__})")
-    remark = arrays.pop(REMARK, None)
+    remark = arrays.get(REMARK)
     temporary = target.with_suffix(f".{os.getpid()}.tmp")
     with temporary.open("wb") as file:
         np.savez(file, **arrays)
@@ -252,7 +311,7 @@ def prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
 
     Raises FormatError for a file of no use.
     """
-    return {"image": _bounded(read_picture(path))}
+    return {"image": _bounded(read_picture(path, longest_px=MAX_SIDE_PX))}
 
 
 def prepare_environment(path: Path) -> dict[str, NDArray[np.generic]]:
@@ -294,7 +353,6 @@ def _read_exr(path: Path) -> NDArray[np.float32]:
 
 def _bounded(image: NDArray[np.generic]) -> NDArray[np.generic]:
     """The image, made smaller if it is larger than `MAX_SIDE_PX`."""
-    check_image_size(Path("it"), image.shape[1], image.shape[0], 3)
     longest = max(image.shape[:2])
     if longest <= MAX_SIDE_PX:
         return image

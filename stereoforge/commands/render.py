@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -14,7 +13,14 @@ from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dat
 from datagen.dataset.layout import EXTRA_TARGETS, Layout
 from datagen.dataset.manifest import SceneManifest
 from datagen.executors import Executor
-from datagen.recipe.assets import describe_splits, import_assets, require_assets
+from datagen.recipe.assets import (
+    ImportedAssets,
+    copy_prepared,
+    describe_splits,
+    import_assets,
+    prepared_assets_folder,
+    require_assets,
+)
 from datagen.recipe.recipe import fit_disparities
 from datagen.rendering.estimate import estimate_run
 from datagen.rendering.quarantine import QuarantinedScene, quarantined_scenes
@@ -25,7 +31,7 @@ from stereoforge.inputs.flag_values import parse_histogram, parse_range, parse_s
 from stereoforge.pipelines.rendering import choose_device
 from stereoforge.places import keep_apart
 from stereoforge.progress import console, progress_bar
-from stereoforge_kit.files import open_tree, temporary_folder
+from stereoforge_kit.files import open_tree
 from stereoforge_kit.viewing import duration
 
 DEFAULT_FAMILY = "flying_things"
@@ -148,15 +154,8 @@ class Render:
             raise UsageError("--dry-run reads no --meshes, --textures or --environments: leave them out")
         if "://" in self.out:
             raise UsageError("--meshes, --textures and --environments need a folder for --out, not a URL")
-        with temporary_folder() as folder:
-            prepared = folder / "assets"
-            imported = import_assets(
-                prepared,
-                meshes=self.meshes,
-                textures=self.textures,
-                environments=self.environments,
-                up_axis=self.up_axis,
-            )
+        with prepared_assets_folder() as store:
+            imported = self._import(store)
             for sentence in imported.skipped:
                 console.print(f"skipped {sentence}", markup=False)
             for sentence in (*imported.remarks, *describe_splits(imported.pool)):
@@ -167,8 +166,22 @@ class Render:
             except DatasetError as error:
                 raise UsageError(str(error)) from error
             render_dataset(replace(recipe, scenes={}), self.out)  # Claims the folder, or refuses it.
-            shutil.copytree(prepared, Layout(Path(self.out)).assets, dirs_exist_ok=True)
+            copy_prepared(imported.pool, store, Layout(Path(self.out)).assets)
         return recipe
+
+    def _import(self, store: Path) -> ImportedAssets:
+        with progress_bar() as progress:
+            task = progress.add_task("preparing your files", total=None)
+            return import_assets(
+                store,
+                meshes=self.meshes,
+                textures=self.textures,
+                environments=self.environments,
+                up_axis=self.up_axis,
+                progress=lambda kind, done, total: progress.update(
+                    task, completed=done, total=total, description=f"preparing {kind}"
+                ),
+            )
 
     def _estimate(self, recipe: Recipe) -> None:
         found = estimate_run(recipe, self.out, device=self.device, shard=parse_shard(self.shard))

@@ -19,11 +19,15 @@ from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dat
 from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
 from datagen.recipe.assets import (
+    MAX_SIDE_PX,
     ImportedAssets,
     UpAxis,
-    _import_folder,
+    _FolderImport,
+    copy_prepared,
     describe_splits,
     import_assets,
+    prepare_environment,
+    prepare_texture,
     require_assets,
 )
 from datagen.recipe.recipe import recipe_from_text, recipe_to_text
@@ -246,13 +250,61 @@ def test_a_file_that_brings_its_reader_down_is_skipped(tmp_path: Path) -> None:
         (tmp_path / f"{name}.stl").write_bytes(bytes([number]))
     skipped: list[str] = []
     limits = Limits(timeout_s=2.0, memory_bytes=900 << 20)
-    (asset,) = _import_folder(tmp_path, (".stl",), crash_or_grow, limits, tmp_path, skipped, [])
+    (asset,) = _FolderImport((".stl",), crash_or_grow, limits, tmp_path).run(tmp_path, skipped, [])
     assert asset.name == "fine.stl"
     crash, greedy, slow = (sentence.removeprefix(f"{tmp_path}/") for sentence in skipped)
     assert crash == "crash.stl: cannot be read, its process crashed (SIGSEGV)"
     assert greedy.startswith("greedy.stl: ")
     assert "memory" in greedy or "used" in greedy
     assert slow == "slow.stl: cannot be read, ran longer than its limit of 2 s"
+
+
+def test_what_a_store_has_is_not_prepared_again(tmp_path: Path) -> None:
+    """An import that was interrupted, or of a folder that has grown, costs the new files only."""
+    folder, store = tmp_path / "meshes", tmp_path / "store"
+    folder.mkdir()
+    for number in range(3):
+        trimesh.creation.icosphere(1, 1.0 + number).export(folder / f"{number}.stl")
+    first = import_assets(store, meshes=folder)
+    before = {path.name: path.stat().st_mtime_ns for path in store.iterdir()}
+    damaged = store / f"{first.pool.meshes[0].sha256}.npz"
+    damaged.write_bytes(damaged.read_bytes()[:100])
+    trimesh.creation.box().export(folder / "3.stl")
+    told: list[tuple[str, int, int]] = []
+    grown = import_assets(store, meshes=folder, progress=lambda *state: told.append(state))
+    assert told == [("meshes", 3, 4), ("meshes", 4, 4)], "the new file and the damaged one"
+    assert {*first.pool.meshes} < {*grown.pool.meshes}
+    after = {path.name: path.stat().st_mtime_ns for path in store.iterdir()}
+    assert {name for name, time in before.items() if after[name] != time} == {damaged.name}
+
+
+def test_pictures_of_large_cameras_and_panoramas_are_made_smaller(tmp_path: Path) -> None:
+    """12,000 x 12,000 pixels of JPEG and 16,384 x 8,192 of HDR were refused."""
+    side = 12_000
+    photograph = np.zeros((side, side, 3), np.uint8)
+    photograph[:, side // 2 :] = (10, 200, 60)
+    assert cv2.imwrite(str(tmp_path / "photograph.jpg"), photograph[..., ::-1])
+    image = prepare_texture(tmp_path / "photograph.jpg")["image"]
+    assert image.shape == (MAX_SIDE_PX, MAX_SIDE_PX, 3)
+    assert np.abs(image[::512, -1].astype(int) - (10, 200, 60)).max() < 8
+    panorama = np.full((8192, 16_384, 3), 0.25, np.float32)
+    assert cv2.imwrite(str(tmp_path / "sky.hdr"), panorama)
+    radiance = prepare_environment(tmp_path / "sky.hdr")["radiance"]
+    assert radiance.shape == (MAX_SIDE_PX // 2, MAX_SIDE_PX, 3)
+
+
+def test_prepared_files_are_copied_whole_and_once(tmp_path: Path) -> None:
+    sha256 = "0" * 64
+    store, target = tmp_path / "store", tmp_path / "set" / "assets"
+    store.mkdir()
+    np.savez(store / f"{sha256}.npz", image=np.zeros((2, 2, 3), np.uint8))
+    np.savez(store / f"{'1' * 64}.npz", image=np.zeros(1))  # of another data set
+    pool = AssetPool(textures=(Asset("a.png", sha256),))
+    copy_prepared(pool, store, target)
+    assert [path.name for path in target.iterdir()] == [f"{sha256}.npz"]
+    time = (target / f"{sha256}.npz").stat().st_mtime_ns
+    copy_prepared(pool, store, target)
+    assert (target / f"{sha256}.npz").stat().st_mtime_ns == time
 
 
 def test_unknown_folders_and_files_are_refused(user: Path, tmp_path: Path) -> None:
@@ -307,6 +359,8 @@ def test_the_sun_of_half_floats_is_no_black_hole(tmp_path: Path) -> None:
     assert found.remarks == (
         f"{tmp_path / 'skies/sun.exr'}: its infinite values are taken for 900, the brightest finite one",
     )
+    again = import_assets(tmp_path / "store", environments=tmp_path / "skies")
+    assert again == found, "said again where nothing is prepared again"
     use_store(tmp_path / "store")
     radiance = UserEnvironment(found.pool.environments[0].sha256).radiance()
     assert (radiance[3, 20] == radiance.max()).all()
