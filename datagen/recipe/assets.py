@@ -49,11 +49,16 @@ PREPARATION = 1
 """Number of what the preparers do: files that another version prepared are prepared anew."""
 MAX_FILE_BYTES = 500 << 20
 MAX_TRIANGLES = 300_000
+"""Meshes of more are decimated (Garland and Heckbert, "Surface simplification using quadric error metrics", 1997)."""
+DRACO = b"KHR_draco_mesh_compression"
+MAX_GLTF_HEADER_BYTES = 1 << 24
+"""Of a GLB file's beginning, which names the extensions that it needs."""
 MAX_SIDE_PX = 4096
 """Larger images are made smaller."""
 MEAN_LUMINANCE = 0.5
 """Environments are scaled to this, so that they light a scene as the generator's own skies do."""
-MESH_LIMITS = Limits(timeout_s=60.0, memory_bytes=1 << 30)
+MESH_LIMITS = Limits(timeout_s=120.0, memory_bytes=4 << 30)
+"""A mesh of 1.3 million triangles takes more than 1 GB to weld and decimate."""
 PICTURE_LIMITS = Limits(timeout_s=60.0, memory_bytes=4 << 30)
 """An environment of 16384 x 8192 pixels takes 1.6 GB before it is made smaller."""
 
@@ -276,18 +281,21 @@ def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> _Outcome:
 def prepare_mesh(path: Path, up_axis: UpAxis = "auto") -> dict[str, NDArray[np.generic]]:
     """A mesh's `vertices` (V, 3), z upwards, `triangles` (T, 3) and `corner_uv` (3 T, 2).
 
+    With a remark if it is decimated to `MAX_TRIANGLES`.
+
     Raises ValueError for a mesh of no use, and whatever the parser raises.
     """
     options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     with path.open("rb") as file:  # From an open file no parser looks for others beside it.
+        if path.suffix.lower() == ".glb" and DRACO in file.read(MAX_GLTF_HEADER_BYTES):
+            raise InputError("it is compressed with Draco, which is not read here; export it without")
+        file.seek(0)
         loaded = trimesh.load(file, file_type=path.suffix[1:].lower(), force="mesh", process=False, **options)
     vertices, triangles = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64)
     if is_y_up(path, up_axis):
         vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1)
     if len(triangles) < 4:
         raise InputError(f"it has {len(triangles)} triangles, too few for a thing")
-    if len(triangles) > MAX_TRIANGLES:
-        raise InputError(f"it has {len(triangles)} triangles, more than {MAX_TRIANGLES}")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise InputError("its triangles name vertices that are not there")
     triangles = triangles[np.isfinite(vertices).all(axis=1)[triangles].all(axis=1)]
@@ -295,10 +303,19 @@ def prepare_mesh(path: Path, up_axis: UpAxis = "auto") -> dict[str, NDArray[np.g
     vertices, triangles = vertices[used], triangles.reshape(-1, 3)
     if not len(triangles) or np.sort(np.ptp(vertices, axis=0))[1] == 0:
         raise InputError("it has no surface")
+    prepared: dict[str, NDArray[np.generic]] = {}
+    if (count := len(triangles)) > MAX_TRIANGLES:
+        fewer = trimesh.Trimesh(vertices, triangles).simplify_quadric_decimation(face_count=MAX_TRIANGLES)
+        vertices, triangles = np.asarray(fewer.vertices, np.float64), np.asarray(fewer.faces, np.int64)
+        prepared[REMARK] = np.array(f"its {count:,} triangles are decimated to {len(triangles):,}")
     mesh = solid(vertices, triangles, smooth=True)
     if len(mesh.triangles) < 4:
         raise InputError("its triangles have no area")
-    return {"vertices": mesh.vertices, "triangles": mesh.triangles, "corner_uv": mesh.corner_uv}
+    return prepared | {
+        "vertices": mesh.vertices,
+        "triangles": mesh.triangles,
+        "corner_uv": mesh.corner_uv,
+    }
 
 
 def is_y_up(path: Path, up_axis: UpAxis) -> bool:

@@ -20,6 +20,7 @@ from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
 from datagen.recipe.assets import (
     MAX_SIDE_PX,
+    MAX_TRIANGLES,
     ImportedAssets,
     UpAxis,
     _FolderImport,
@@ -27,6 +28,7 @@ from datagen.recipe.assets import (
     describe_splits,
     import_assets,
     prepare_environment,
+    prepare_mesh,
     prepare_texture,
     require_assets,
 )
@@ -291,6 +293,27 @@ def test_pictures_of_large_cameras_and_panoramas_are_made_smaller(tmp_path: Path
     assert cv2.imwrite(str(tmp_path / "sky.hdr"), panorama)
     radiance = prepare_environment(tmp_path / "sky.hdr")["radiance"]
     assert radiance.shape == (MAX_SIDE_PX // 2, MAX_SIDE_PX, 3)
+
+
+def test_fine_meshes_are_decimated(tmp_path: Path) -> None:
+    trimesh.creation.icosphere(7).export(tmp_path / "ball.stl")  # 327,680 triangles.
+    prepared = prepare_mesh(tmp_path / "ball.stl")
+    assert len(prepared["triangles"]) <= MAX_TRIANGLES
+    assert np.abs(np.linalg.norm(prepared["vertices"], axis=1) - 1).max() < 1e-3
+    assert str(prepared["remark"]).startswith("its 327,680 triangles are decimated to ")
+
+
+def test_draco_and_empty_files_are_called_by_their_name(tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(
+        b"glTF\2\0\0\0" + b'{"extensionsRequired": ["KHR_draco_mesh_compression"]}'
+    )
+    (tmp_path / "b.stl").write_bytes(b"")
+    trimesh.creation.box().export(tmp_path / "c.stl")
+    skipped = import_assets(tmp_path / "store", meshes=tmp_path).skipped
+    assert [sentence.removeprefix(f"{tmp_path}/") for sentence in skipped] == [
+        "b.stl: is empty",
+        "a.glb: cannot be read (it is compressed with Draco, which is not read here; export it without)",
+    ]
 
 
 def test_prepared_files_are_copied_whole_and_once(tmp_path: Path) -> None:
