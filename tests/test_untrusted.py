@@ -45,12 +45,19 @@ def test_no_module_imports_what_can_run_code_when_it_reads() -> None:
     assert found == {PIPE_TO_OWN_CHILD}
 
 
+def weights_only(call: ast.Call) -> bool:
+    """Whether torch, or Lightning for it, is told to build nothing but tensors and plain containers."""
+    return any(
+        keyword.arg == "weights_only" and ast.unparse(keyword.value) == "True" for keyword in call.keywords
+    )
+
+
 def test_no_module_calls_what_can_run_code_when_it_reads() -> None:
     found = [
         f"{name}:{node.lineno} {ast.unparse(node.func)}"
         for name, tree in sources()
         for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in FORBIDDEN_CALLS
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in FORBIDDEN_CALLS and not weights_only(node)
     ]
     assert found == []
 
@@ -74,11 +81,7 @@ def test_lightning_reads_checkpoints_as_weights_only() -> None:
         if isinstance(node, ast.Call) and any(keyword.arg == "ckpt_path" for keyword in node.keywords)
     ]
     assert calls
-    for call in calls:
-        assert any(
-            keyword.arg == "weights_only" and ast.unparse(keyword.value) == "True"
-            for keyword in call.keywords
-        )
+    assert all(map(weights_only, calls))
 
 
 @pytest.mark.parametrize(

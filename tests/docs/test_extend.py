@@ -79,7 +79,8 @@ def test_the_method_runs(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_reader_reads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (kind,) = module("FORMATS = ", monkeypatch)["FORMATS"]
-    picture, disparity = np.full((4, 6, 3), 7, np.uint8), np.arange(24, dtype=np.float32).reshape(4, 6)
+    picture = np.full((4, 6, 3), 7, np.uint8)
+    disparity = np.linspace(0, 6, 24, dtype=np.float32).reshape(4, 6)  # no wider than the picture
     write_png(tmp_path / "a.png", picture)
     write_png(tmp_path / "a-right.png", picture)
     write_pfm(tmp_path / "a.pfm", disparity)

@@ -10,7 +10,6 @@ from typing import cast
 
 import numpy as np
 import pytest
-from tests.stereoforge.test_submission import SIZE, kitti_set
 
 from datagen import DatasetError
 from datagen.sources.registry import open_source
@@ -18,6 +17,7 @@ from refine.methods.regressor import Regressor
 from stereoforge.pipelines.prediction import Predictors
 from stereoforge.pipelines.set_evaluation import evaluate_set, open_test_data
 from tests.datagen.sources import published
+from tests.stereoforge.pipelines.test_submission import SIZE, kitti_set
 from training.prediction.predictor import Prediction
 
 PREDICTOR = cast(

@@ -226,14 +226,14 @@ def test_the_demo_leaves_what_it_promises(demo: tuple[Path, DemoResult]) -> None
     )
     assert result.evaluation.scores["ours"].regions["all"].epe > 0
     assert set(numbers["sets"][1]["methods"]) == {"regressor", "gradnet", "ours", "ours_conf_gt"}
-    shipped, own = (
-        each.scores["regressor"].regions["all"].epe for each in (result.shipped, result.evaluation)
+    bundled, own = (
+        each.scores["regressor"].regions["all"].epe for each in (result.bundled, result.evaluation)
     )
-    assert shipped < own  # three steps of training against hours
+    assert bundled < own  # three steps of training against hours
 
 
 @pytest.mark.slow
-def test_the_shipped_networks_refine_a_pair(demo: tuple[Path, DemoResult], tmp_path: Path) -> None:
+def test_the_bundled_weights_refine_a_pair(demo: tuple[Path, DemoResult], tmp_path: Path) -> None:
     out, _ = demo
     pair = [next(out.glob(f"data/frames_cleanpass/TEST/A/0000/{eye}/*.png")) for eye in ("left", "right")]
     assert run("refine", *pair, "--out", tmp_path / "r") == 0
