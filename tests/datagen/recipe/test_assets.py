@@ -18,6 +18,7 @@ import trimesh
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
+from datagen.dataset.shards import CACHE_VARIABLE
 from datagen.recipe.assets import (
     MAX_SIDE_PX,
     MAX_TRIANGLES,
@@ -342,7 +343,9 @@ def test_unknown_folders_and_files_are_refused(user: Path, tmp_path: Path) -> No
             named()
 
 
-def test_a_data_set_carries_the_files_it_uses(user: Path, tmp_path: Path) -> None:
+def test_a_data_set_carries_the_files_it_uses(
+    user: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out, recipe = tmp_path / "set", tmp_path / "recipe.yaml"
     recipe.write_text(
         "world: {family: flying_things, width: 96, height: 54, flying_objects: [6, 6], "
@@ -350,6 +353,7 @@ def test_a_data_set_carries_the_files_it_uses(user: Path, tmp_path: Path) -> Non
         "scenes: {train: 1}\nsamples: 1\nseed: 1\n"
     )
     folders = {name: user / name for name in ("meshes", "textures", "environments")}
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
     Render(out=str(out), recipe=recipe, workers=1, **folders).run()
     written = read_recipe(out / "recipe.yaml")
     assert len(written.assets.meshes) == 16
