@@ -227,9 +227,9 @@ class _FolderImport:
                 continue
             if not path.is_file():
                 skipped.append(f"{path}: is no file, or a link to none")
-            elif path.stat().st_size > MAX_FILE_BYTES:
+            elif (size := path.stat().st_size) > MAX_FILE_BYTES:
                 skipped.append(f"{path}: is larger than {MAX_FILE_BYTES >> 20} MB")
-            elif not path.stat().st_size:
+            elif not size:
                 skipped.append(f"{path}: is empty")
             else:
                 with path.open("rb") as file:
@@ -240,7 +240,8 @@ class _FolderImport:
 
     def _prepared(self, jobs: list[tuple[Path, Path]]) -> Iterator[tuple[Path, _Outcome]]:
         """The outcome of each file, in any order. Raises MachineError where no file is at fault."""
-        fitting = available_memory_bytes() // (self.limits.memory_bytes or available_memory_bytes())
+        available = available_memory_bytes()
+        fitting = available // (self.limits.memory_bytes or available)
         workers = max(1, min(len(jobs), len(os.sched_getaffinity(0)), fitting))
         executor = LocalExecutor(({},) * workers, WorkerPolicy(self.limits, attempts=1))
         with closing(executor.run(partial(_prepare_file, self.prepare), jobs)) as outcomes:

@@ -114,7 +114,7 @@ def checkpoint_step(path: Path) -> int | None:
     if not path.is_file():
         return None
     try:
-        return int(torch.load(path, map_location="cpu", weights_only=True, mmap=True)["global_step"])
+        return int(WholeCheckpoints().load_checkpoint(path, weights_only=True)["global_step"])
     except Exception as error:  # torch raises nearly anything for a damaged file
         raise TrainingError(
             f"{path}: cannot be read, so the run cannot be resumed; delete it to start anew"
