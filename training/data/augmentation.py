@@ -2,6 +2,9 @@
 
 Geometry (one crop window, zoom and squeeze for both views) and colour follow the augmentation layers of the released
 DispNet training definition. Images are interpolated bilinearly. Disparity and gradients take the nearest pixel's value.
+
+What tells two real cameras apart can be added (`training.data.view_differences`). Disparity stays that of the ideal
+rig.
 """
 
 from __future__ import annotations
@@ -14,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.ground_truth.labels import forward_differences
+from stereoforge_kit.camera_effects import blurred
+from training.data.view_differences import compressed, erased, one_view_blurred, vertical_shifts
 
 Float32 = NDArray[np.float32]
 
@@ -87,10 +92,33 @@ class AugmentationConfig:
     """Standard deviation of the Gaussian noise, U(0, this) of the range 0..1, the same for both views."""
     right_only: float = 0.01
     """Standard deviation of the small additional brightness, contrast, gamma and colour changes of the right view."""
+    antialias: bool = False
+    """Blur what a zoom below 1 makes smaller, so that it does not alias; for wide ranges of `log_zoom` (ours)."""
+    vertical_misalignment: float = 0.0
+    """The right view lies U(-this, this) pixels of the crop too low (ours)."""
+    roll_deg: float = 0.0
+    """The right view is also moved along y as if its camera were turned about its axis by U(-this, this) degrees. The
+    turn's small moves along x are left out, so that the disparity holds (ours)."""
+    log_view_brightness: float = 0.0
+    """Factor exp U(-this, this) of all colour channels, drawn for each view by itself (ours)."""
+    log_view_color: float = 0.0
+    """Factor exp U(-this, this) of each colour channel, drawn for each view by itself (ours)."""
+    one_sided_blur: float = 0.0
+    """A quarter of the pairs have one view, either, blurred with a Gaussian of U(0, this) pixels (ours)."""
+    erasing: float = 0.0
+    """Probability of one or two rectangles of the right view in its mean colour, as in RAFT-Stereo's training."""
+    erased_size: tuple[float, float] = (50.0, 100.0)
+    """Shortest and longest side of these rectangles in pixels of the crop."""
+    jpeg: float = 0.0
+    """Probability of JPEG compression, of both views with one quality (ours)."""
+    jpeg_quality: tuple[int, int] = (30, 95)
+    """Lowest and highest quality, 1..100."""
 
 
 SHEARED = 0.25
 """Share of the pairs that `AugmentationConfig.shear` applies to."""
+BLURRED = 0.25
+"""Share of the pairs that `AugmentationConfig.one_sided_blur` applies to."""
 WINDOW_TRIALS = 50
 """Windows drawn before the centre crop is taken."""
 RIGHT_ONLY_GROWTH_STEPS = 50_000
@@ -139,13 +167,31 @@ def augment(
         pair = turn_over(pair)
     window = draw_window(rng, pair.left.shape[:2], size, config)
     tone_curves = draw_tone_curves(rng, config, step)
-    sample = cut(pair, window, size, tone_curves, draw_shear(rng, config))
+    shear = draw_shear(rng, config)
+    shifts = draw_vertical_shifts(rng, size, config)
+    if config.antialias:
+        pair = smooth_for(pair, window)
+    sample = cut(pair, window, size, tone_curves, shear, shifts)
+    if config.one_sided_blur > 0 and rng.random() < BLURRED:
+        sample = replace_views(
+            sample, one_view_blurred(rng, sample.left, sample.right, config.one_sided_blur)
+        )
     noise = np.float32(rng.uniform(0, config.noise))
     if noise > 0:
         left = sample.left + noise * draw_normal(rng, sample.left.shape)
         right = sample.right + noise * draw_normal(rng, sample.right.shape)
         sample = replace(sample, left=left, right=right)
+    # In the order of a camera: light, sensor, file. The flat patches come last, so that they stay flat.
+    if config.jpeg > 0 and rng.random() < config.jpeg:
+        sample = replace_views(sample, compressed(rng, sample.left, sample.right, config.jpeg_quality))
+    if config.erasing > 0 and rng.random() < config.erasing:
+        sample = replace(sample, right=erased(rng, sample.right, config.erased_size))
     return sample
+
+
+def replace_views(sample: TrainingSample, views: tuple[Float32, Float32]) -> TrainingSample:
+    """The sample with other images, (left, right)."""
+    return replace(sample, left=views[0], right=views[1])
 
 
 def draw_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Float32:
@@ -223,12 +269,38 @@ def draw_shear(rng: np.random.Generator, config: AugmentationConfig) -> float:
     return float(slope) if rng.random() < SHEARED else 0.0
 
 
+def draw_vertical_shifts(
+    rng: np.random.Generator, size: tuple[int, int], config: AugmentationConfig
+) -> NDArray[np.float64] | None:
+    """Draw how far the right view's columns are moved along y, (W,) px of a crop of size (H, W); None for nowhere."""
+    if config.vertical_misalignment == 0 and config.roll_deg == 0:
+        return None
+    shift, roll = rng.uniform(-1, 1, 2) * (config.vertical_misalignment, config.roll_deg)
+    return vertical_shifts(size[1], shift, roll)
+
+
+def smooth_for(pair: StereoPair, window: Window) -> StereoPair:
+    """The pair with images that a window's zoom, where it is below 1, samples without aliasing.
+
+    The blur adds to that of a pixel of the source, whose deviation is about half a pixel, what one of the crop has.
+    """
+    sigma = tuple(0.5 * np.sqrt(max(zoom**-2 - 1.0, 0.0)) for zoom in (window.zoom_x, window.zoom_y))
+    if not any(sigma):
+        return pair
+    left, right = (
+        np.rint(blurred(image.astype(np.float32), (sigma[0], sigma[1]))).astype(np.uint8)
+        for image in (pair.left, pair.right)
+    )
+    return replace(pair, left=left, right=right)
+
+
 def cut(
     pair: StereoPair,
     window: Window,
     size: tuple[int, int],
     tone_curves: tuple[Float32, Float32],
     shear: float = 0.0,
+    shifts: NDArray[np.float64] | None = None,
 ) -> TrainingSample:
     """Crop, recolour and resample both views and the left view's ground truth.
 
@@ -242,6 +314,8 @@ def cut(
         tone_curves: (256, 3) colours in 0..1 of the levels 0..255, for the left and the right view.
         shear: Disparity added per row, in pixels of the source. It is 0 in the window's first row or, if negative, in
             its last, so disparities stay positive. Occlusions in a row stay as they were.
+        shifts: (W,) how many pixels of the crop lower than it should be each column of the right view lies; None for
+            an aligned pair. Disparity does not change.
     """
     rows = window.top_px + (np.arange(size[0]) + 0.5) / window.zoom_y
     columns = window.left_px + (np.arange(size[1]) + 0.5) / window.zoom_x
@@ -253,9 +327,10 @@ def cut(
     moves = shear * (rows - (rows[0] if shear > 0 else rows[-1]))
     gradient = gradient + np.array([0.0, shear], np.float32)
     columns_right = columns if shear == 0 else columns + moves[:, None]
+    rows_right = rows if shifts is None else rows[:, None] - shifts / window.zoom_y
     return TrainingSample(
         left=sample_bilinear(pair.left, rows, columns, tone_curves[0]),
-        right=sample_bilinear(pair.right, rows, columns_right, tone_curves[1]),
+        right=sample_bilinear(pair.right, rows_right, columns_right, tone_curves[1]),
         disparity=(disparity + moves[:, None].astype(np.float32)) * np.float32(window.zoom_x),
         gradient=gradient * np.array([1.0, window.zoom_x / window.zoom_y], np.float32),
     )
@@ -277,7 +352,7 @@ def sample_bilinear(
 
     Args:
         image: (h, w, 3) uint8.
-        rows: (H,) positions in pixels; pixel centres lie at + 0.5.
+        rows: (H,) positions in pixels, or (H, W) if each column has its own; pixel centres lie at + 0.5.
         columns: (W,) positions, or (H, W) if each row has its own.
         tone_curve: (256, 3) colours in 0..1 of the levels 0..255.
 
@@ -286,12 +361,18 @@ def sample_bilinear(
     """
     row, row_weight = _neighbours(rows, image.shape[0])
     column, column_weight = _neighbours(columns, image.shape[1])
-    first_row, first_column = int(row[0]), int(column.min())
-    part = image[first_row : row[-1] + 2, first_column : int(column.max()) + 2]
+    first_row, first_column = int(row.min()), int(column.min())
+    part = image[first_row : int(row.max()) + 2, first_column : int(column.max()) + 2]
     colors = cv2.LUT(np.ascontiguousarray(part), tone_curve[None])
     row, column = row - first_row, column - first_column
     below = np.minimum(row + 1, colors.shape[0] - 1)
     right = np.minimum(column + 1, colors.shape[1] - 1)
+    if row.ndim == 2:
+        before, after = (
+            colors[row, at] + (colors[below, at] - colors[row, at]) * row_weight[..., None]
+            for at in (column, right)
+        )
+        return before + (after - before) * column_weight[..., None]
     lines = np.take(colors, row, axis=0)
     lines += (np.take(colors, below, axis=0) - lines) * row_weight[:, None, None]
     values: Float32 = _at_columns(lines, column)
@@ -314,7 +395,7 @@ def draw_tone_curves(
 ) -> tuple[Float32, Float32]:
     """Draw brightness, colour, contrast and gamma as (256, 3) tone curves of the left and the right view.
 
-    Both views get the same changes, and the right view small ones of its own.
+    Both views get the same changes, the right view small ones of its own, and each view those that the config asks for.
 
     Args:
         rng: Source of all randomness.
@@ -327,10 +408,19 @@ def draw_tone_curves(
     color = brightness * np.exp(rng.uniform(-1, 1, 3) * config.log_color)
     offset, *extra = rng.standard_normal(6) * config.right_only * right_only_growth(step)
     extra_contrast, extra_gamma, *extra_color = np.exp(extra)
+    left_color, right_color = draw_view_colors(rng, config)
     return (
-        tone_curve(color, 0.0, contrast, gamma),
-        tone_curve(color * extra_color, offset, contrast * extra_contrast, gamma * extra_gamma),
+        tone_curve(color * left_color, 0.0, contrast, gamma),
+        tone_curve(color * extra_color * right_color, offset, contrast * extra_contrast, gamma * extra_gamma),
     )
+
+
+def draw_view_colors(rng: np.random.Generator, config: AugmentationConfig) -> NDArray[np.float64]:
+    """Draw (2, 3) factors of the colour channels of the left and the right view, each by itself; 1 if nothing asks."""
+    if config.log_view_brightness == 0 and config.log_view_color == 0:
+        return np.ones((2, 3))
+    drawn = rng.uniform(-1, 1, (2, 4)) * (config.log_view_brightness, *[config.log_view_color] * 3)
+    return np.exp(drawn[:, :1] + drawn[:, 1:])
 
 
 def tone_curve(color: NDArray[np.float64], offset: float, contrast: float, gamma: float) -> Float32:
