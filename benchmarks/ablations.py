@@ -29,10 +29,12 @@ from refine.evaluation.tuning import measure
 from refine.metrics import sparsification_curve
 from stereoforge.pipelines.prediction import open_predictors, open_settings
 from training.metrics import AUC_STEPS
+from training.networks import DispNetConfig
+from training.networks.regressors.dispnet import MultiscaleObjective
 from training.presets import (
     SMALL_CONFNET,
+    SMALL_DISPNET,
     SMALL_GRADNET,
-    SMALL_REGRESSOR,
     STAGE_WEIGHTS,
     AugmentationConfig,
     ConfNetPreset,
@@ -53,14 +55,15 @@ DILATIONS = {
 }
 
 
-def _staged(steps: int) -> dict[str, Any]:
+def _staged() -> dict[str, Any]:
     """The published schedule of loss weights, compressed: each stage but the last a tenth of the run."""
-    return {"loss_stages": STAGE_WEIGHTS, "stage_ends": tuple(steps * k // 10 for k in range(1, 7))}
+    return {"objective": MultiscaleObjective(STAGE_WEIGHTS, tuple(k / 10 for k in range(1, 7)))}
 
 
 def regressors() -> dict[str, Preset]:
-    base = SMALL_REGRESSOR
+    base = SMALL_DISPNET
     network, optimizer = base.network, base.optimizer
+    assert isinstance(network, DispNetConfig)
 
     def other_network(**changes: Any) -> RegressorPreset:
         return replace(base, network=replace(network, **changes))
@@ -82,9 +85,9 @@ def regressors() -> dict[str, Preset]:
         "rate 5e-4": other_optimizer(learning_rate=5e-4),
         "no warm-up": other_optimizer(warmup_steps=0),
         "no clipping": other_optimizer(clip_norm=None),
-        "published loss stages, compressed": replace(base, **_staged(base.steps)),
-        "all scales alike": replace(base, loss_stages=(EVEN,)),
-        "finest scale only": replace(base, loss_stages=(FINEST_ONLY,)),
+        "published loss stages, compressed": replace(base, **_staged()),
+        "all scales alike": replace(base, objective=MultiscaleObjective((EVEN,))),
+        "finest scale only": replace(base, objective=MultiscaleObjective((FINEST_ONLY,))),
         "moving average 0.998": replace(base, ema_decay=0.998),
         "published augmentation": replace(base, augmentation=AugmentationConfig(horizontal_flip=0.5)),
         "no flips": replace(base, augmentation=replace(base.augmentation, horizontal_flip=0.0)),
@@ -94,7 +97,7 @@ def regressors() -> dict[str, Preset]:
 
 def curricula() -> dict[str, Preset]:
     """On the graded set: the order of its frames ignored, or followed over a part of the run."""
-    base = SMALL_REGRESSOR
+    base = SMALL_DISPNET
     return {
         "graded, mixed": base,
         "graded, simple first, 0.3": replace(base, curriculum=0.3),

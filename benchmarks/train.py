@@ -28,9 +28,11 @@ from benchmarks.plain_dispnet import PlainDispNet
 from training.data.batch import StereoBatch
 from training.data.pipeline import StereoDataModule, open_sources
 from training.losses import multiscale_l1
-from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.networks import ConfNet, DispNetConfig, GradNet, Regressor
+from training.networks.regressors.registry import regressor_for
 from training.presets import (
     PRESETS,
+    REGRESSOR_PRESETS,
     ConfNetPreset,
     FineTuningPreset,
     GradNetPreset,
@@ -66,11 +68,16 @@ def random_batch(preset: Preset, crops: int) -> StereoBatch:
     )
 
 
+def build_regressor(preset: RegressorPreset) -> Regressor:
+    """A new network of a preset."""
+    return regressor_for(preset.network)(preset.network)
+
+
 def build_task(preset: Preset, regressor_preset: RegressorPreset) -> StereoTask:
     """The task of a preset on new networks."""
-    network = DispNetCorr1D(regressor_preset.network)
+    network = build_regressor(regressor_preset)
     if isinstance(preset, RegressorPreset):
-        return RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0)
+        return RegressorTask(preset, build_regressor(preset), preset.steps, 0)
     if isinstance(preset, FineTuningPreset):
         return FineTuningTask(preset, network, preset.steps, 0)
     if isinstance(preset, RegressorFreeConfNetPreset):
@@ -207,15 +214,16 @@ def fadnet_dispnet(folder: Path) -> nn.Module:
 
 def compare(name: str, crops: int, rounds: int, fadnet: Path | None) -> None:
     """Print one iteration of a preset against its rivals."""
-    preset = find_preset("regressor", name)
+    preset = find_preset("regressor", name, "dispnet")
     assert isinstance(preset, RegressorPreset)
     batch = random_batch(preset, crops)
     clip = preset.optimizer.clip_norm is not None
-    task = RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0)
+    task = RegressorTask(preset, build_regressor(preset), preset.steps, 0)
     ours = our_step(task, batch)
+    assert isinstance(preset.network, DispNetConfig)
     plain = PlainDispNet(preset.network)
     left, right = batch.left, batch.right
-    half = RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0)
+    half = RegressorTask(preset, build_regressor(preset), preset.steps, 0)
     steps = {
         "ours": ours,
         "ours in bf16": our_step(half, batch, bf16=True),
@@ -245,9 +253,9 @@ def compare(name: str, crops: int, rounds: int, fadnet: Path | None) -> None:
     )
 
 
-def measure_preset(task_name: str, name: str, crops: int, iterations: int) -> None:
+def measure_preset(task_name: str, network: str, name: str, crops: int, iterations: int) -> None:
     """Print one preset's speed and the peak memory of this process, which does nothing else."""
-    preset, regressor = find_preset(task_name, name), find_preset("regressor", name)
+    preset, regressor = find_preset(task_name, name, network), find_preset("regressor", name, network)
     assert isinstance(regressor, RegressorPreset)
     step = our_step(build_task(preset, regressor), random_batch(preset, crops))
     step()
@@ -257,7 +265,7 @@ def measure_preset(task_name: str, name: str, crops: int, iterations: int) -> No
     wall, cpu = (time.perf_counter() - began) / iterations, (time.process_time() - cpu) / iterations
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(
-        f"{task_name:14}{name:6}{crops} x {preset.crop_width}x{preset.crop_height:<6}{1 / wall:8.2f} it/s  "
+        f"{task_name:14}{network:12}{name:6}{crops} x {preset.crop_width}x{preset.crop_height:<6}{1 / wall:8.2f} it/s  "
         f"{cpu:8.3f} CPU s/it  {memory:5.2f} GiB",
         flush=True,
     )
@@ -267,12 +275,13 @@ def presets(names: list[str], iterations: int, full_crops: int) -> None:
     """Each preset in a process of its own; not `joint`, whose solves take as long as the pictures want
     (`benchmarks.differentiable`)."""
     context = multiprocessing.get_context("spawn")
-    for task_name, kinds in PRESETS.items():
-        if task_name == "joint":
-            continue
+    tasks = [("regressor", network, kinds) for network, kinds in REGRESSOR_PRESETS.items()]
+    tasks += [(task_name, "dispnet", kinds) for task_name, kinds in PRESETS.items() if task_name != "joint"]
+    for task_name, network, kinds in tasks:
         for name in (name for name in names if name in kinds):
             crops = full_crops if name == "full" else kinds[name].batch_size
-            process = context.Process(target=measure_preset, args=(task_name, name, crops, iterations))
+            settings = (task_name, network, name, crops, iterations)
+            process = context.Process(target=measure_preset, args=settings)
             process.start()
             process.join()
 
@@ -280,7 +289,7 @@ def presets(names: list[str], iterations: int, full_crops: int) -> None:
 def data(folder: str, batches: int) -> None:
     """Print what the pipeline delivers on one core against what training `small` takes there."""
     torch.set_num_threads(1)
-    preset = find_preset("regressor", "small")
+    preset = find_preset("regressor", "small", "dispnet")
     sources, _ = open_sources([(folder, 1.0)], (preset.crop_height, preset.crop_width))
     module = StereoDataModule(sources, [], replace(preset, validation_interval=batches), batches, 0)
     loader = iter(module.block(0))
@@ -291,7 +300,7 @@ def data(folder: str, batches: int) -> None:
     crop = (time.process_time() - began) / ((batches - 1) * preset.batch_size)
     assert isinstance(preset, RegressorPreset)
     batch = random_batch(preset, preset.batch_size)
-    step = our_step(RegressorTask(preset, DispNetCorr1D(preset.network), preset.steps, 0), batch)
+    step = our_step(RegressorTask(preset, build_regressor(preset), preset.steps, 0), batch)
     training = alternate({"step": step}, 7)["step"] / preset.batch_size
     print(
         f"pipeline {1 / crop:.0f} crops a CPU second, `small` takes {1 / training:.0f}: {training / crop:.1f} x"
@@ -327,7 +336,11 @@ def main() -> None:
     else:
         torch.set_num_threads(1)
         for name in arguments.names:
-            crops = arguments.full_crops if name == "full" else find_preset("regressor", name).batch_size
+            crops = (
+                arguments.full_crops
+                if name == "full"
+                else find_preset("regressor", name, "dispnet").batch_size
+            )
             compare(name, crops, arguments.rounds, arguments.fadnet)
 
 

@@ -26,20 +26,20 @@ STATIC_WEIGHTS: ScaleWeights = (0.2, 0.2, 0.2, 0.2, 0.2, 1.0)
 """The weights in DispNet's released training definition, which continues from trained weights."""
 
 
-def stage_weights(step: int, stages: Sequence[ScaleWeights], ends: Sequence[int]) -> ScaleWeights:
-    """The weights that apply at a step.
+def stage_weights(progress: float, stages: Sequence[ScaleWeights], ends: Sequence[float]) -> ScaleWeights:
+    """The weights that apply at a point of the run.
 
     Args:
-        step: Number of the step, from 0.
+        progress: Share of the run that is done, from 0.
         stages: The weights of each stage.
-        ends: The step at which each stage but the last ends, not decreasing.
+        ends: Share of the run at which each stage but the last ends, not decreasing.
 
     Raises:
         ValueError: there is not one end fewer than stages.
     """
     if len(ends) != len(stages) - 1:
         raise ValueError(f"{len(stages)} loss stages need {len(stages) - 1} ends, got {tuple(ends)}")
-    return stages[sum(step >= end for end in ends)]
+    return stages[sum(progress >= end for end in ends)]
 
 
 def masked_mean(values: Tensor, mask: Tensor) -> Tensor:
@@ -106,6 +106,42 @@ def multiscale_l1(predictions: Sequence[Tensor], truth: Tensor, weights: Sequenc
         if weight > 0
     ]
     return torch.stack(losses).sum()
+
+
+def disparity_smooth_l1(prediction: Tensor, truth: Tensor, beta_px: float) -> Tensor:
+    """Mean smooth L1 over valid pixels: squared below `beta_px`, linear above (Girshick, ICCV 2015).
+
+    Args:
+        prediction: (B, 1, H, W) px.
+        truth: (B, 1, H, W) px, NaN invalid.
+        beta_px: Errors below this count by their squares.
+    """
+    valid = ~torch.isnan(truth)
+    error = F.smooth_l1_loss(prediction, torch.where(valid, truth, 0.0), beta=beta_px, reduction="none")
+    return masked_mean(error, valid)
+
+
+CENTRAL_PIXELS = ((1, 1), (1, 2), (2, 1), (2, 2))
+"""Row and column of the pixels in a cell of 4x4 whose ground truth stands for it."""
+
+
+def level_cross_entropy(scores: Tensor, truth: Tensor, spread: float) -> Tensor:
+    """Cross-entropy of a volume's softmax against Laplacians about the ground truth.
+
+    A cell of the volume covers 4x4 pixels. Its target is the mean of the distributions of its central pixels, so a cell
+    on an edge has two peaks.
+
+    Args:
+        scores: (B, h, w, D), logits.
+        truth: (B, 1, 4h, 4w) in levels, NaN invalid.
+        spread: Scale of the Laplacian in levels.
+    """
+    cells = torch.stack([truth[:, 0, row::4, column::4] for row, column in CENTRAL_PIXELS])
+    valid = ~torch.isnan(cells)
+    levels = torch.arange(scores.shape[-1], device=scores.device, dtype=scores.dtype)
+    distances = (torch.where(valid, cells, 0.0)[..., None] - levels).abs()
+    targets = (-distances / spread).softmax(-1)
+    return masked_mean(-(targets * scores.log_softmax(-1)).sum(-1), valid)
 
 
 def gradient_aware_l1(prediction: Tensor, truth: Tensor, gradient_weight: float) -> Tensor:

@@ -1,7 +1,8 @@
 """All numbers of all training runs, in one place.
 
-`full` is the published training of DispNetCorr1D, ConfNet and GradNet. `small` (about 2.7 million parameters, a 11 MB
-file) and `tiny` (minutes on a laptop's CPU) differ from it where short runs on few pairs need it (ours):
+`full` is the published training of DispNetCorr1D, ConfNet and GradNet. For these networks `small` (about 2.7 million
+parameters, a 11 MB file) and `tiny` (minutes on a laptop's CPU) differ from it where short runs on few pairs need it
+(ours):
 
 - BatchNorm, with fixed statistics towards the end of a regressor's run;
 - a one-sided correlation, and predictions in units of 16 px;
@@ -12,6 +13,8 @@ file) and `tiny` (minutes on a laptop's CPU) differ from it where short runs on 
 - heads that take cost features too (`training.networks.cost_features`), since a small regressor's matching features
   hold too little of them;
 - in `small`, sheared crops for the heads and larger dilations in GradNet (docs/ablations.md).
+
+CostVolumeNet (ours) has presets of the same names.
 """
 
 from __future__ import annotations
@@ -22,12 +25,15 @@ from typing import Any, Literal, get_args
 
 from stereoforge_kit.matching import SGBMParameters
 from training.data.augmentation import AugmentationConfig
-from training.data.sampling import SamplingConfig
+from training.data.sampling import CROP_MULTIPLE, SamplingConfig
 from training.errors import TrainingError
-from training.losses import STAGE_WEIGHTS, STATIC_WEIGHTS, ScaleWeights
-from training.networks import PUBLISHED_GRADNET, DispNetConfig, HeadConfig
+from training.losses import STATIC_WEIGHTS
+from training.networks import PUBLISHED_GRADNET, CostVolumeConfig, DispNetConfig, HeadConfig
 from training.networks.regressor_free import REGRESSOR_FREE_CHANNELS
-from training.networks.regressors.dispnet import STRIDE
+from training.networks.regressors.costvolume import CostVolumeObjective
+from training.networks.regressors.dispnet import MultiscaleObjective
+from training.networks.regressors.interface import Objective, RegressorConfig
+from training.networks.regressors.registry import find_regressor, regressor_for
 
 Task = Literal["regressor", "regressor_f", "confnet", "gradnet", "confnet_free", "gradnet_free", "joint"]
 """Names of the tasks, on the command line and in the names of files."""
@@ -79,14 +85,12 @@ class Preset(SamplingConfig):
 
 @dataclass(frozen=True, kw_only=True)
 class RegressorPreset(Preset):
-    """DispNetCorr1D from scratch."""
+    """A regressor from scratch."""
 
-    network: DispNetConfig = field(default_factory=DispNetConfig)
-    """Options of the network."""
-    loss_stages: tuple[ScaleWeights, ...] = STAGE_WEIGHTS
-    """Weights of the six scales' losses, one row per stage."""
-    stage_ends: tuple[int, ...]
-    """The step at which each stage but the last ends."""
+    network: RegressorConfig
+    """Options of the network; their type says which network it is."""
+    objective: Objective
+    """What the network is trained to minimise."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,19 +188,20 @@ SMALL_OPTIMIZER = OptimizerConfig(
 )
 """Adam of the short runs (ours)."""
 
-FULL_REGRESSOR = RegressorPreset(
+FULL_DISPNET = RegressorPreset(
     steps=1_200_000,
     batch_size=4,
     crop_width=768,
     crop_height=384,
     optimizer=OptimizerConfig(halve_at=(200_000, 350_000, 500_000, 650_000, 800_000), weight_decay=4e-4),
-    stage_ends=(100_000, 200_000, 300_000, 400_000, 500_000, 600_000),
+    network=DispNetConfig(),
+    objective=MultiscaleObjective(stage_ends=tuple(stage / 12 for stage in range(1, 7))),
     validation_interval=10_000,
 )
 """The published training. The lengths of the stages are not published; 100,000 steps each is what a public retraining
 used (ours)."""
 
-SMALL_REGRESSOR = RegressorPreset(
+SMALL_DISPNET = RegressorPreset(
     steps=20_000,
     batch_size=4,
     crop_width=320,
@@ -204,20 +209,89 @@ SMALL_REGRESSOR = RegressorPreset(
     optimizer=SMALL_OPTIMIZER,
     augmentation=SMALL_AUGMENTATION,
     network=DispNetConfig(width=0.25, one_sided=True, normalization="batch", prediction_scale=16.0),
-    loss_stages=(STATIC_WEIGHTS,),
-    stage_ends=(),
+    objective=MultiscaleObjective(stages=(STATIC_WEIGHTS,)),
     validation_interval=500,
     fixed_statistics=0.3,
 )
 """For hours on few pairs (ours)."""
-TINY_REGRESSOR = replace(
-    SMALL_REGRESSOR,
+TINY_DISPNET = replace(
+    SMALL_DISPNET,
     steps=800,
     optimizer=replace(SMALL_OPTIMIZER, learning_rate=2e-3, warmup_steps=40),
     validation_interval=200,
     validation_samples=16,
 )
 """At twice the learning rate of `small`, so short a run has errors lower by 8 to 9 % (docs/ablations.md)."""
+
+RIG_AUGMENTATION = AugmentationConfig(
+    log_zoom=(-0.3, 0.5),
+    log_squeeze=(-0.15, 0.15),
+    horizontal_flip=0.5,
+    shear=0.3,
+    log_brightness=0.3,
+    log_gamma=0.3,
+    log_contrast=0.3,
+    log_color=0.2,
+    noise=0.03,
+    antialias=True,
+    vertical_misalignment=1.0,
+    roll_deg=0.2,
+    log_view_brightness=0.15,
+    log_view_color=0.08,
+    one_sided_blur=1.0,
+    erasing=0.3,
+    erased_size=(30.0, 80.0),
+    jpeg=0.2,
+)
+"""Wide zoom, and what tells the two cameras of a real rig apart."""
+
+SMALL_COSTVOLUME = RegressorPreset(
+    steps=12_000,
+    batch_size=4,
+    crop_width=320,
+    crop_height=160,
+    optimizer=replace(SMALL_OPTIMIZER, warmup_steps=300),
+    augmentation=RIG_AUGMENTATION,
+    network=CostVolumeConfig(),
+    objective=CostVolumeObjective(),
+    validation_interval=500,
+    fixed_statistics=0.2,
+)
+"""For hours on few pairs (ours)."""
+TINY_COSTVOLUME = replace(
+    SMALL_COSTVOLUME,
+    steps=600,
+    augmentation=SMALL_AUGMENTATION,
+    optimizer=replace(SMALL_COSTVOLUME.optimizer, learning_rate=2e-3, warmup_steps=40),
+    validation_interval=200,
+    validation_samples=16,
+)
+"""For minutes (ours)."""
+FULL_COSTVOLUME = replace(
+    SMALL_COSTVOLUME,
+    steps=200_000,
+    batch_size=16,
+    crop_width=640,
+    crop_height=320,
+    optimizer=OptimizerConfig(
+        learning_rate=1e-3,
+        schedule="cosine",
+        warmup_steps=2000,
+        epsilon=1e-8,
+        weight_decay=1e-5,
+        clip_norm=1.0,
+    ),
+    network=CostVolumeConfig(
+        stem=32,
+        encoder=(64, 96, 128),
+        descriptor_groups=8,
+        aggregation=(16, 32, 64),
+        look_groups=4,
+        look_channels=64,
+    ),
+    validation_interval=5000,
+)
+"""For a day of a GPU. The sizes are about those of LightStereo (Guo et al., 2024); nobody has trained it (ours)."""
 
 FULL_FINE_TUNING = FineTuningPreset(
     steps=100_000,
@@ -391,7 +465,6 @@ TINY_JOINT = replace(
 """Both heads through the refinement, for minutes (ours)."""
 
 PRESETS: dict[Task, dict[str, Preset]] = {
-    "regressor": {"tiny": TINY_REGRESSOR, "small": SMALL_REGRESSOR, "full": FULL_REGRESSOR},
     "regressor_f": {"tiny": TINY_FINE_TUNING, "small": SMALL_FINE_TUNING, "full": FULL_FINE_TUNING},
     "confnet": {"tiny": TINY_CONFNET, "small": SMALL_CONFNET, "full": FULL_CONFNET},
     "gradnet": {"tiny": TINY_GRADNET, "small": SMALL_GRADNET, "full": FULL_GRADNET},
@@ -399,28 +472,50 @@ PRESETS: dict[Task, dict[str, Preset]] = {
     "gradnet_free": {"tiny": TINY_REGRESSOR_FREE_GRADNET, "small": SMALL_REGRESSOR_FREE_GRADNET},
     "joint": {"tiny": TINY_JOINT, "small": SMALL_JOINT},
 }
-"""The presets of each task by their names."""
+"""The presets of each task that trains one kind of network, by their names."""
+REGRESSOR_PRESETS: dict[str, dict[str, Preset]] = {
+    "dispnet": {"tiny": TINY_DISPNET, "small": SMALL_DISPNET, "full": FULL_DISPNET},
+    "costvolume": {"tiny": TINY_COSTVOLUME, "small": SMALL_COSTVOLUME, "full": FULL_COSTVOLUME},
+}
+"""The presets of the task `regressor`, by the names of the networks and their own."""
+DEFAULT_NETWORK = "costvolume"
+"""The regressor that is trained where nobody names one."""
 
 
-def find_preset(task: str, name: str) -> Preset:
+def find_preset(task: str, name: str, network: str = DEFAULT_NETWORK) -> Preset:
     """Find the preset of a task by its name.
 
+    Args:
+        task: Name of the task.
+        name: Name of the preset.
+        network: Name of the regressor, for the task `regressor`.
+
     Raises:
-        TrainingError: no such task or preset; lists those that there are.
+        TrainingError: no such task, network or preset; lists those that there are.
     """
-    for known, presets in PRESETS.items():
+    for known in TASKS:
         if known == task:
+            presets = _presets_of(network) if task == "regressor" else PRESETS[known]
             if name not in presets:
                 raise TrainingError(f"{task} has no preset {name!r}; there are {', '.join(presets)}")
             return presets[name]
     raise TrainingError(f"there is no task {task!r}; there are {', '.join(TASKS)}")
 
 
+def _presets_of(network: str) -> Mapping[str, Preset]:
+    find_regressor(network)
+    if network not in REGRESSOR_PRESETS:
+        raise TrainingError(
+            f"there is no preset for the network {network!r}; pass a RegressorPreset of your own"
+        )
+    return REGRESSOR_PRESETS[network]
+
+
 def change_preset(preset: Preset, changes: Mapping[str, Any]) -> Preset:
     """Change some fields of a preset.
 
     Raises:
-        TrainingError: a field that the preset does not have, or a crop size that is no multiple of 64.
+        TrainingError: a field that the preset does not have, or a crop size that does not suit the network.
     """
     known = [field.name for field in fields(preset)]
     for name in changes:
@@ -430,8 +525,11 @@ def change_preset(preset: Preset, changes: Mapping[str, Any]) -> Preset:
             )
     changed = replace(preset, **changes)
     size = changed.crop_width, changed.crop_height
-    if any(length % STRIDE for length in size) or min(size) < STRIDE:
+    unit = CROP_MULTIPLE
+    if isinstance(changed, RegressorPreset):
+        unit = regressor_for(changed.network).stride
+    if any(length % unit for length in size) or min(size) < unit:
         raise TrainingError(
-            f"crops must be multiples of {STRIDE} each way, not {changed.crop_width}x{changed.crop_height}"
+            f"crops must be multiples of {unit} each way, not {changed.crop_width}x{changed.crop_height}"
         )
     return changed

@@ -12,7 +12,7 @@ import tyro
 
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import CommandError, UsageError
-from stereoforge.inputs.flag_values import parse_methods, several, shown
+from stereoforge.inputs.flag_values import check_max_disparity, parse_methods, several, shown
 from stereoforge.places import keep_apart
 from stereoforge.progress import console
 
@@ -38,6 +38,8 @@ class Evaluate:
     predictor: Literal["networks", "sgbm"] = "networks"
     """What gives the disparity that is refined: the run folder's networks, or semi-global matching, judged by its
     confnet_free and gradnet_free."""
+    max_disparity: Annotated[int | None, shown("PX", "chosen for the pictures")] = None
+    """Largest disparity in pixels to look for. DispNetCorr1D looks as far as it was trained to."""
     parameters: Annotated[Path | None, shown("FILE", "the run folder's, if it has one")] = None
     """The methods' parameters, as `stereoforge tune` writes them."""
     bad_threshold: Annotated[float | None, shown("PX", "1, for KITTI 3")] = None
@@ -62,6 +64,7 @@ class Evaluate:
             raise UsageError("evaluate needs at least one data set")
         if self.bad_threshold is not None and not self.bad_threshold > 0:
             raise UsageError(f"--bad-threshold must be positive, got {self.bad_threshold}")
+        check_max_disparity(self.max_disparity)
         if self.seed < 0:
             raise UsageError(f"--seed must not be negative, got {self.seed}")
         if self.posterior < 0:
@@ -91,7 +94,7 @@ class Evaluate:
         data = open_test_data(self.data, self.split, skip_broken=self.skip_broken)
         submission = find_submission(self.data) if self.submission else None
         settings = open_settings(self.parameters, self.weights, self.predictor)
-        predictors = open_predictors(self.weights, self.device, self.predictor)
+        predictors = open_predictors(self.weights, self.device, self.predictor, self.max_disparity)
         rows = settings.rows(methods)
         lacking = untrained(rows, self.weights, self.predictor)
         notes = untrained_notes(lacking, self.weights, self.predictor)

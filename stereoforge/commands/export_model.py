@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from stereoforge.inputs.flag_values import shown
+from stereoforge.inputs.flag_values import check_max_disparity, shown
 from stereoforge.progress import console
 
 
@@ -16,7 +16,7 @@ from stereoforge.progress import console
 class ExportModel:
     """Write the networks of a run folder as one ONNX file, checked with onnxruntime against torch.
 
-    It takes `left` and `right` (B, 3, H, W) in 0..1, sides multiples of 64, of any such size, and gives `disparity`
+    It takes `left` and `right` (B, 3, H, W) in 0..1, of any size whose sides are multiples of 64, and gives `disparity`
     (B, 1, H, W) and, where the folder has the networks, `confidence` (B, 1, H, W) and `gradient` (B, 2, H, W).
     """
 
@@ -24,6 +24,9 @@ class ExportModel:
     """Run folder of the networks."""
     out: Annotated[Path, shown("DIR")]
     """Folder for stereoforge.onnx and the model card."""
+    max_disparity: Annotated[int | None, shown("PX", "192 for CostVolumeNet")] = None
+    """Largest disparity in pixels that the model looks for, whatever the pictures' size. DispNetCorr1D looks as far as
+    it was trained to."""
     device: Annotated[str, shown("NAME")] = "auto"
     """What torch computes on to compare: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
@@ -32,7 +35,8 @@ class ExportModel:
         from training.prediction.onnx_export import export_model
         from training.runs.model_card import write_model_card
 
-        exported = export_model(self.run_folder, self.out, self.device)
+        check_max_disparity(self.max_disparity)
+        exported = export_model(self.run_folder, self.out, self.device, self.max_disparity)
         write_model_card(self.run_folder, self.out)
         console.print(
             f"{exported.path}: {', '.join(exported.outputs)}; onnxruntime agrees with torch to "

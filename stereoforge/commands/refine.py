@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
-from stereoforge.inputs.flag_values import shown
+from stereoforge.inputs.flag_values import check_max_disparity, shown
 from stereoforge.inputs.images import pair_doubts, read_color_images
 from stereoforge.places import keep_apart
 from stereoforge.progress import console
@@ -69,6 +69,8 @@ class Refine:
     """Disparity of the right view, which tells how far to trust the left one's."""
     predictor: Literal["networks", "sgbm"] = "networks"
     """What predicts the disparity: the run folder's networks, or OpenCV's semi-global matching."""
+    max_disparity: Annotated[int | None, shown("PX", "chosen for the pictures")] = None
+    """Largest disparity in pixels to look for. DispNetCorr1D looks as far as it was trained to."""
     parameters: Annotated[Path | None, shown("FILE", "the run folder's, if it has one")] = None
     """The MRF's parameters, as `stereoforge tune` writes them."""
     form: Annotated[Literal["exact", "paper"] | None, shown("exact|paper", "ours, as validated")] = None
@@ -103,7 +105,9 @@ class Refine:
         method = settings.ours
         if self.form is not None:
             method = replace(settings.ours_quadratic, form=self.form)
-        prediction, notes = predict_pair(left, right, given, self.weights, self.device, self.predictor)
+        prediction, notes = predict_pair(
+            left, right, given, self.weights, self.device, self.predictor, self.max_disparity
+        )
         assert prediction.confidence is not None
         assert prediction.gradient is not None
         with console.status("refining; the first time after an install this compiles for a minute"):
@@ -125,6 +129,7 @@ class Refine:
         )
 
     def _check(self) -> None:
+        check_max_disparity(self.max_disparity)
         if self.disparity is not None and self.predictor != "networks":
             raise UsageError("--disparity and --predictor sgbm both give the disparity; choose one")
         if self.disparity_right is not None and self.disparity is None:

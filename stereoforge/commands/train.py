@@ -38,10 +38,10 @@ class Train:
         ],
         shown("TASK"),
     ]
-    """regressor: DispNetCorr1D. regressor_f: a regressor fine-tuned on gradients too. confnet, gradnet: the heads on a
-    regressor. confnet_free, gradnet_free: regressor-free heads, trained on semi-global matching, for the disparity of
-    any predictor. rdf: a random forest, the rival of ConfNet. joint: trains confnet and gradnet of --init further,
-    through the refinement, into another run folder."""
+    """regressor: the network that predicts disparity. regressor_f: a regressor fine-tuned on gradients too. confnet,
+    gradnet: the heads on a regressor. confnet_free, gradnet_free: regressor-free heads, trained on semi-global
+    matching, for the disparity of any predictor. rdf: a random forest, the rival of ConfNet. joint: trains confnet and
+    gradnet of --init further, through the refinement, into another run folder."""
     data: Annotated[tuple[str, ...], several("DATA[:WEIGHT]")]
     """Data sets, each with how often it is drawn from relative to the others (default 1): folders or URLs, with
     FORMAT: in front where the folder does not tell, #0-99 behind for a part."""
@@ -49,10 +49,13 @@ class Train:
     """Run folder."""
     preset: Literal["tiny", "small", "full"] = "small"
     """tiny: minutes on a laptop; small: hours; full: the paper's own training."""
+    network: Annotated[str | None, shown("NAME", "costvolume")] = None
+    """regressor: costvolume is CostVolumeNet, which matches and so does well on photographs too; dispnet is
+    DispNetCorr1D, the paper's."""
     validation: Annotated[tuple[str, ...], shown("DATA", "the val splits of --data")] = ()
     """Data sets that decide which weights are kept."""
     crop: Annotated[str | None, shown("WxH", "the preset's")] = None
-    """Size of the training crops, multiples of 64; KITTI's frames need 320 rows or fewer."""
+    """Size of the training crops, multiples of 64 (for costvolume, of 16); KITTI's frames need 320 rows or fewer."""
     correct_within: Annotated[float | None, shown("PX", "the preset's, 1")] = None
     """confnet: a disparity this close to the ground truth counts as correct (KITTI: 3)."""
     ema: Annotated[float | None, shown("DECAY", "none")] = None
@@ -105,6 +108,8 @@ class Train:
         ):
             if value is not None and value < least:
                 raise UsageError(f"--{name} must be at least {least}, got {value}")
+        if self.network is not None and self.task != "regressor":
+            raise UsageError(f"--network is for regressor; {self.task} takes the regressor of its run folder")
         data = [parse_weighted_source(text) for text in self.data]
         for source, _ in data:
             keep_apart("--out", self.out, "--data", source)
@@ -119,6 +124,7 @@ class Train:
             self._train_forest([source for source, _ in data])
             return
         from stereoforge.pipelines.prediction import open_settings, parameters_file
+        from training.presets import DEFAULT_NETWORK
         from training.runs.hardware import process_rank
         from training.runs.request import TrainingRequest
         from training.runs.run_folder import written_networks
@@ -130,6 +136,7 @@ class Train:
             data=tuple(data),
             out=self.out,
             preset=self.preset,
+            network=self.network or DEFAULT_NETWORK,
             validation=self.validation,
             changes=self._changes(),
             pseudo_labels=self.pseudo_labels,

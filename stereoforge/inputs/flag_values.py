@@ -120,3 +120,9 @@ def parse_methods(text: str) -> tuple[str, ...]:
     except ValueError as error:
         raise UsageError(f"--methods: {error}") from error
     return names
+
+
+def check_max_disparity(pixels: int | None) -> None:
+    """Raise UsageError for a --max-disparity that is not positive."""
+    if pixels is not None and pixels < 1:
+        raise UsageError(f"--max-disparity must be at least 1, got {pixels}")

@@ -99,6 +99,7 @@ def run_demo(out: Path, plan: DemoPlan | None = None, device: str = "auto") -> D
                     ((data, 1.0),),
                     weights,
                     "tiny",
+                    network="dispnet",
                     steps=plan.steps[network],
                     resume=True,
                     device=device,

@@ -125,13 +125,31 @@ class Predictors:
         return self.forest.confidence(prediction.disparity, consistency, sample.left)
 
 
-def open_predictors(run: Path, device: str = "cpu", predictor: PredictorName = "networks") -> Predictors:
-    """Open the networks of a run folder. Raises TrainingError, naming what is wrong."""
+def open_predictors(
+    run: Path,
+    device: str = "cpu",
+    predictor: PredictorName = "networks",
+    max_disparity: int | None = None,
+) -> Predictors:
+    """Open the networks of a run folder, or semi-global matching with its regressor-free ones.
+
+    Args:
+        run: Run folder.
+        device: As `training.devices.parse_device` takes it.
+        predictor: What gives the disparity.
+        max_disparity: Largest disparity in pixels to look for; None leaves it to the predictor.
+
+    Raises:
+        TrainingError: Names what is wrong.
+    """
     if predictor == "sgbm":
-        return Predictors(open_matching(run, device), None)
+        return Predictors(open_matching(run, device, max_disparity), None)
+    fine_tuned = None
+    if has_weights(run, "regressor_f"):
+        fine_tuned = StereoPredictor(run, device, "regressor_f", max_disparity)
     return Predictors(
-        initial=StereoPredictor(run, device),
-        fine_tuned=StereoPredictor(run, device, "regressor_f") if has_weights(run, "regressor_f") else None,
+        initial=StereoPredictor(run, device, max_disparity=max_disparity),
+        fine_tuned=fine_tuned,
         forest=load_forest(forest_file(run)) if forest_file(run).exists() else None,
     )
 
@@ -157,9 +175,12 @@ def forest_file(run: Path) -> Path:
     return run / "rdf.safetensors"
 
 
-def open_matching(run: Path, device: str = "cpu", matcher: SGBMParameters | None = None) -> MatchingPredictor:
-    """Semi-global matching with the regressor-free networks of a run folder."""
-    return MatchingPredictor(RegressorFreePredictor(run, device), matcher or SGBMParameters())
+def open_matching(run: Path, device: str = "cpu", max_disparity: int | None = None) -> MatchingPredictor:
+    """Semi-global matching up to a disparity in pixels, with the regressor-free networks of a run folder."""
+    matcher = SGBMParameters()
+    if max_disparity is not None:
+        matcher = replace(matcher, max_disparity_px=max_disparity)
+    return MatchingPredictor(RegressorFreePredictor(run, device), matcher)
 
 
 def fallback_notes(run: Path) -> list[str]:
@@ -221,11 +242,13 @@ def predict_pair(
     run: Path,
     device: str,
     predictor: PredictorName,
+    max_disparity: int | None = None,
 ) -> tuple[Prediction, list[str]]:
     """The inputs of refining one pair, and a sentence for each input that had to be replaced.
 
     Args:
         given: The left view's disparity and perhaps the right view's, instead of a predictor.
+        max_disparity: Largest disparity in pixels that the predictor looks for; None leaves it to the predictor.
 
     Raises:
         CommandError: The run folder lacks a network.
@@ -237,10 +260,10 @@ def predict_pair(
                 f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
                 f"right {right.shape[1]}x{right.shape[0]}"
             )
-        matching = open_matching(run, device)
+        matching = open_matching(run, device, max_disparity)
         answer = matching.predict(left, right) if given is None else matching.predict_for(left, right, *given)
         return answer, fallback_notes(run)
-    answer = StereoPredictor(run, device).predict(left, right)
+    answer = StereoPredictor(run, device, max_disparity=max_disparity).predict(left, right)
     for name, found in (("confnet", answer.confidence), ("gradnet", answer.gradient)):
         if found is None:
             raise CommandError(

@@ -63,6 +63,8 @@ class StudyPlan:
     samples: int = 4
     """Paths a pixel."""
     preset: str = "small"
+    network: str = "dispnet"
+    """The regressor: `dispnet`, the paper's, or `costvolume`."""
     fine_tuning_steps: int = 0
     """Steps of the subject's regressor on the training split of each other test domain that has one; 0 leaves that
     out."""
@@ -100,7 +102,7 @@ class StudyPlan:
                 )
         if min(self.fine_tuning_steps, self.tuning_frames, self.seed) < 0:
             raise UsageError("fine_tuning_steps, tuning_frames and the seed must not be negative")
-        find_preset("regressor", self.preset)
+        find_preset("regressor", self.preset, self.network)
         if self.forest and self.preset not in PLANS:
             raise UsageError(
                 f"there is no forest of the preset {self.preset!r}; there are {', '.join(PLANS)}"

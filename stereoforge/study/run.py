@@ -235,7 +235,7 @@ class _Study:
         )
 
     def _training_job(self, name: str, task: str, domain: str, steps: int | None, init: Job | None) -> Job:
-        preset = self.presets.get(task) or find_preset(task, self.plan.preset)
+        preset = self.presets.get(task) or find_preset(task, self.plan.preset, self.plan.network)
         curriculum = self.plan.domains[domain].curriculum
         changes = {"curriculum": curriculum} if curriculum and task == "regressor" else {}
         preset = change_preset(preset, changes)
@@ -256,6 +256,7 @@ class _Study:
                 data=((data.source, 1.0),),
                 out=folder,
                 preset=self.presets.get(task, self.plan.preset),
+                network=self.plan.network,
                 changes=changes,
                 init=init.folder if init else None,
                 resume=True,

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from datagen.formats import write_pfm, write_png
 from datagen.ground_truth.raycast import SceneRayCaster
@@ -19,6 +20,8 @@ from datagen.recipe.recipe import Recipe
 from refine.method import EvaluationFrame
 from scenes import scene_from_json, scene_to_json
 from scenes.random_draws import integer
+from training.networks import ConfNet, HeadConfig
+from training.networks.inference import estimate
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "extend.md"
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
@@ -34,7 +37,7 @@ def module(defines: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 def test_the_page_has_a_block_a_kind() -> None:
-    assert len(BLOCKS) == 5
+    assert len(BLOCKS) == 6
 
 
 def test_the_family_samples_worlds_that_can_be_rendered(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,6 +68,28 @@ def test_the_texture_is_a_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     assert picture.dtype == np.uint8
     assert np.array_equal(picture, texture.image())
     assert integer(np.random.default_rng(0), 4, 12) == texture.bands
+
+
+def test_the_regressor_answers_and_learns(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = module("class PlainNet", monkeypatch)
+    torch.manual_seed(0)
+    network = made["PlainNet"](made["PlainConfig"](channels=8, levels=8))
+    confnet = ConfNet(HeadConfig(width=4, hidden=4).on(network)).eval()
+    right = torch.rand(1, 3, 12, 40)
+    left = right.roll(6, -1)
+    found = estimate(network, confnet, None, left[..., :39], right[..., :39])
+    assert found.disparity.shape == (1, 1, 12, 39)
+    assert found.confidence is not None
+    objective, truth = made["PlainObjective"](), torch.full((1, 1, 12, 40), 6.0)
+    optimizer = torch.optim.Adam(network.parameters(), 0.02)
+    losses = []
+    for _ in range(60):
+        optimizer.zero_grad()
+        loss = objective(network(left, right), truth, 0.0)
+        loss.backward()
+        optimizer.step()
+        losses.append(loss.item())
+    assert losses[-1] < 0.3 * losses[0]
 
 
 def test_the_method_runs(monkeypatch: pytest.MonkeyPatch) -> None:

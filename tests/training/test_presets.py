@@ -1,7 +1,7 @@
 """The full presets are the published training; schedules follow their definition."""
 
 import math
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
 
 import pytest
 import torch
@@ -18,12 +18,16 @@ from training.networks import (
     predict_right,
 )
 from training.networks.inference import regress
+from training.networks.regressors.dispnet import MultiscaleObjective
+from training.networks.regressors.registry import known_regressors, regressor_for
 from training.presets import (
     PRESETS,
+    REGRESSOR_PRESETS,
     ConfNetPreset,
     FineTuningPreset,
     GradNetPreset,
     OptimizerConfig,
+    Preset,
     RegressorPreset,
     find_preset,
 )
@@ -32,7 +36,7 @@ from training.tasks.base import learning_rate_factor
 
 
 def test_full_regressor() -> None:
-    preset = find_preset("regressor", "full")
+    preset = find_preset("regressor", "full", "dispnet")
     assert isinstance(preset, RegressorPreset)
     assert preset.network == DispNetConfig() == DispNetConfig(1.0, 40, False, "none", 1.0)
     assert (preset.batch_size, preset.crop_width, preset.crop_height) == (4, 768, 384)
@@ -40,7 +44,16 @@ def test_full_regressor() -> None:
     assert (optimizer.learning_rate, optimizer.betas, optimizer.epsilon) == (1e-4, (0.9, 0.999), 1e-4)
     assert optimizer.halve_at == (200_000, 350_000, 500_000, 650_000, 800_000)
     assert (optimizer.weight_decay, optimizer.clip_norm, optimizer.warmup_steps) == (4e-4, None, 0)
-    assert preset.loss_stages == STAGE_WEIGHTS
+    assert isinstance(preset.objective, MultiscaleObjective)
+    assert preset.objective.stages == STAGE_WEIGHTS
+    assert [round(end * preset.steps) for end in preset.objective.stage_ends] == [
+        100_000,
+        200_000,
+        300_000,
+        400_000,
+        500_000,
+        600_000,
+    ]
     augmentation = preset.augmentation
     assert (augmentation.translation, augmentation.log_zoom, augmentation.log_squeeze) == (
         0.4,
@@ -77,7 +90,7 @@ def test_full_heads() -> None:
 
 
 def full_regressor() -> RegressorPreset:
-    preset = find_preset("regressor", "full")
+    preset = find_preset("regressor", "full", "dispnet")
     assert isinstance(preset, RegressorPreset)
     return preset
 
@@ -85,7 +98,7 @@ def full_regressor() -> RegressorPreset:
 def narrow_task() -> RegressorTask:
     """The full preset's task, as training builds it but for the network's width."""
     preset = full_regressor()
-    return RegressorTask(preset, DispNetCorr1D(replace(preset.network, width=0.0625)), preset.steps, seed=0)
+    return RegressorTask(preset, DispNetCorr1D(DispNetConfig(width=0.0625)), preset.steps, seed=0)
 
 
 def test_the_full_optimizer_runs_the_published_schedule() -> None:
@@ -146,29 +159,44 @@ def test_full_heads_see_the_features_and_the_mirrored_consistency() -> None:
         assert groups[0]["eps"] == epsilon
 
 
-@pytest.mark.parametrize(("task", "name"), [(task, name) for task in PRESETS for name in PRESETS[task]])
-def test_presets_are_coherent(task: str, name: str) -> None:
-    preset = find_preset(task, name)
-    assert preset.crop_width % 64 == preset.crop_height % 64 == 0
+EVERY_PRESET = [preset for presets in PRESETS.values() for preset in presets.values()]
+EVERY_PRESET += [preset for presets in REGRESSOR_PRESETS.values() for preset in presets.values()]
+
+
+def test_every_regressor_has_presets() -> None:
+    assert REGRESSOR_PRESETS.keys() == known_regressors().keys()
+    for network, presets in REGRESSOR_PRESETS.items():
+        assert presets.keys() == {"tiny", "small", "full"}
+        for preset in presets.values():
+            assert isinstance(preset, RegressorPreset)
+            assert regressor_for(preset.network).name == network
+
+
+@pytest.mark.parametrize("preset", EVERY_PRESET)
+def test_presets_are_coherent(preset: Preset) -> None:
+    unit = regressor_for(preset.network).stride if isinstance(preset, RegressorPreset) else 64
+    assert preset.crop_width % unit == preset.crop_height % unit == 0
     assert preset.optimizer.warmup_steps < preset.steps
     for field in fields(preset):
         value = getattr(preset, field.name)
         if is_dataclass(value):
             hash(value)
     if isinstance(preset, RegressorPreset):
-        assert list(preset.stage_ends) == sorted(preset.stage_ends)
-        assert len(preset.stage_ends) == len(preset.loss_stages) - 1
-        assert all(end <= preset.steps for end in preset.stage_ends)
+        objective = preset.objective
+        assert list(objective.stage_ends) == sorted(objective.stage_ends)
+        assert all(0 < end < 1 for end in objective.stage_ends)
+        if isinstance(objective, MultiscaleObjective):
+            assert len(objective.stage_ends) == len(objective.stages) - 1
 
 
 def test_decay_reaches_the_contracting_weights_only() -> None:
-    preset = find_preset("regressor", "full")
+    preset = find_preset("regressor", "full", "dispnet")
     assert isinstance(preset, RegressorPreset)
     network = DispNetCorr1D(DispNetConfig(width=0.0625))
     task = RegressorTask(preset, network, preset.steps, seed=0)
     decayed, free = task.configure_optimizers()["optimizer"].param_groups
     assert (decayed["weight_decay"], free["weight_decay"]) == (4e-4, 0)
-    assert {id(p) for p in decayed["params"]} == {id(p) for p in network.contracting_weights()}
+    assert {id(p) for p in decayed["params"]} == {id(p) for p in network.decayed_parameters()}
     trained = {id(p) for p in network.parameters() if p.requires_grad}
     assert {id(p) for group in (decayed, free) for p in group["params"]} == trained
 

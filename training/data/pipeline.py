@@ -26,9 +26,8 @@ from datagen.sources.webdataset import ShardFrames
 from training.data.augmentation import IDENTITY_CURVE, StereoPair, TrainingSample, Window, augment, cut
 from training.data.batch import StereoBatch
 from training.data.fingerprint import data_fingerprint
-from training.data.sampling import SamplingConfig
+from training.data.sampling import CROP_MULTIPLE, SamplingConfig
 from training.errors import TrainingError
-from training.networks.regressors.dispnet import STRIDE
 
 DEFAULT_CACHE_BYTES = 2 << 30
 """Memory for decoded frames, 2 GiB."""
@@ -363,8 +362,9 @@ def too_small(name: str, size: tuple[int, ...], crop: tuple[int, int], smallest:
     """
     said = f"{name}: frames of {size[1]}x{size[0]} are smaller than the {crop[1]}x{crop[0]} crops"
     height, width = (
-        min(least // STRIDE * STRIDE, length) for least, length in zip(smallest, crop, strict=True)
+        min(least // CROP_MULTIPLE * CROP_MULTIPLE, length)
+        for least, length in zip(smallest, crop, strict=True)
     )
-    if min(height, width) < STRIDE:
-        return f"{said}, and no crop can be smaller than {STRIDE}x{STRIDE}"
+    if min(height, width) < CROP_MULTIPLE:
+        return f"{said}, and no crop can be smaller than {CROP_MULTIPLE}x{CROP_MULTIPLE}"
     return f"{said}; crops of {width}x{height} fit (--crop {width}x{height})"

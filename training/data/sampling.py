@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 from training.data.augmentation import AugmentationConfig
 
+CROP_MULTIPLE = 64
+"""Crops of a multiple of this many pixels each way suit every network."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SamplingConfig:
@@ -14,9 +17,9 @@ class SamplingConfig:
     batch_size: int
     """Crops per step (and per process)."""
     crop_width: int
-    """Width of the crops in pixels, a multiple of 64."""
+    """Width of the crops in pixels, a multiple of the regressor's stride."""
     crop_height: int
-    """Height of the crops in pixels, a multiple of 64."""
+    """Height of the crops in pixels, a multiple of the regressor's stride."""
     augmentation: AugmentationConfig = field(default_factory=AugmentationConfig)
     """Random changes of the crops."""
     curriculum: float = 0.0

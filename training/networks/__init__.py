@@ -1,6 +1,7 @@
-"""The networks: DispNetCorr1D predicts disparity; ConfNet and GradNet judge it from its matching features.
+"""The networks: a regressor predicts disparity; ConfNet and GradNet judge it from its matching features.
 
-Their default constructors give the full networks of the paper.
+The regressors are DispNetCorr1D, the paper's, and CostVolumeNet, ours. The default constructors of the paper's networks
+give the full ones.
 
 Examples:
     >>> import torch
@@ -23,22 +24,28 @@ from training.networks.correlation import Correlation1D, correlate_1d
 from training.networks.gradnet import PUBLISHED_GRADNET, GradNet
 from training.networks.heads import HeadConfig
 from training.networks.lrc import left_right_consistency, predict_right
+from training.networks.regressors.costvolume import CostVolumeConfig, CostVolumeNet
 from training.networks.regressors.dispnet import (
     DispNetConfig,
     DispNetCorr1D,
     DispNetOutput,
     full_resolution,
 )
+from training.networks.regressors.interface import Regression, Regressor
 
 __all__ = [
     "PUBLISHED_GRADNET",
     "ConfNet",
     "Correlation1D",
+    "CostVolumeConfig",
+    "CostVolumeNet",
     "DispNetConfig",
     "DispNetCorr1D",
     "DispNetOutput",
     "GradNet",
     "HeadConfig",
+    "Regression",
+    "Regressor",
     "correlate_1d",
     "full_resolution",
     "left_right_consistency",

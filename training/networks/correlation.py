@@ -88,3 +88,19 @@ class Correlation1D(nn.Module):
     def forward(self, left: Tensor, right: Tensor) -> Tensor:
         """Correlate two feature maps (B, C, H, W) to (B, K, H, W), K = `out_channels`."""
         return correlate_1d(left, right, self.max_displacement, self.one_sided)
+
+
+class ShiftedCorrelation1D(nn.Module):
+    """`Correlation1D` as shifted products: slower, but with the same graph for any image size."""
+
+    def __init__(self, correlation: Correlation1D) -> None:
+        super().__init__()
+        self.reach = correlation.max_displacement
+        self.count = correlation.out_channels
+
+    def forward(self, left: Tensor, right: Tensor) -> Tensor:
+        """As `Correlation1D.forward`."""
+        padded = F.pad(right, (self.reach, self.count - 1 - self.reach))
+        width = left.shape[-1]
+        products = [(left * padded[..., shift : shift + width]).mean(dim=1) for shift in range(self.count)]
+        return torch.stack(products, dim=1)

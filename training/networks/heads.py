@@ -9,7 +9,8 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
-from training.networks.regressors.dispnet import LEAKY_SLOPE, DispNetCorr1D, FeatureKind, Normalization
+from training.networks.regressors.dispnet import LEAKY_SLOPE, Normalization
+from training.networks.regressors.interface import FeatureKind, Regressor
 
 Activation = Literal["relu", "leaky_relu"]
 """After every convolution but the last: ReLU in ConfNet, LeakyReLU in GradNet (the paper)."""
@@ -22,7 +23,7 @@ class HeadConfig:
     The defaults are the full networks. The paper gives neither widths nor dropout, so those are ours.
 
     Examples:
-        >>> from training.networks.regressors.dispnet import DispNetConfig
+        >>> from training.networks.regressors.dispnet import DispNetConfig, DispNetCorr1D
         >>> regressor = DispNetCorr1D(DispNetConfig(width=0.25))
         >>> HeadConfig(half_resolution=True).on(regressor).feature_channels
         25
@@ -47,10 +48,10 @@ class HeadConfig:
     cost_features: bool = False
     """Take the maps of `training.networks.cost_features` as inputs too (ours)."""
     features: FeatureKind = "joined"
-    """Which matching features of the regressor: `joined`, as the paper words it (97 channels at full width), or
-    `decoded` (32 channels)."""
+    """Which matching features of the regressor: `joined`, as the paper words it (97 channels in DispNetCorr1D at full
+    width), or `decoded` (32 channels)."""
 
-    def on(self, regressor: DispNetCorr1D) -> HeadConfig:
+    def on(self, regressor: Regressor) -> HeadConfig:
         """The same config with the number of channels of this regressor's features."""
         return replace(self, feature_channels=regressor.feature_channels[self.features])
 

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 from torch.onnx import OnnxExporterError
 
 from stereoforge_kit.files import temporary_folder, write_bytes
 from training.devices import parse_device
 from training.errors import TrainingError
-from training.networks import ConfNet, Correlation1D, DispNetCorr1D, GradNet
-from training.networks.inference import head_inputs, network_size
+from training.networks import ConfNet, GradNet, Regressor
+from training.networks.inference import head_inputs
 from training.prediction.predictor import StereoPredictor
 
 FILE_NAME = "stereoforge.onnx"
@@ -39,26 +38,10 @@ class ExportedModel:
     """Largest difference to torch's outputs, relative to their largest value."""
 
 
-class ShiftedCorrelation(nn.Module):
-    """`Correlation1D` as shifted products: slower, but with the same graph for any image size."""
-
-    def __init__(self, correlation: Correlation1D) -> None:
-        super().__init__()
-        self.reach = correlation.max_displacement
-        self.count = correlation.out_channels
-
-    def forward(self, left: Tensor, right: Tensor) -> Tensor:
-        """As `Correlation1D.forward`."""
-        padded = F.pad(right, (self.reach, self.count - 1 - self.reach))
-        width = left.shape[-1]
-        products = [(left * padded[..., shift : shift + width]).mean(dim=1) for shift in range(self.count)]
-        return torch.stack(products, dim=1)
-
-
 class ExportedNetworks(nn.Module):
     """All networks of a run folder as one module."""
 
-    def __init__(self, regressor: DispNetCorr1D, confnet: ConfNet | None, gradnet: GradNet | None) -> None:
+    def __init__(self, regressor: Regressor, confnet: ConfNet | None, gradnet: GradNet | None) -> None:
         super().__init__()
         self.regressor, self.confnet, self.gradnet = regressor, confnet, gradnet
 
@@ -76,7 +59,7 @@ class ExportedNetworks(nn.Module):
         """Predict all maps of the left view.
 
         Args:
-            left, right: (B, 3, H, W) in 0..1, H and W multiples of 64.
+            left, right: (B, 3, H, W) in 0..1, H and W multiples of the regressor's stride.
 
         Returns:
             Disparity (B, 1, H, W) px, then confidence (B, 1, H, W) and gradient (B, 2, H, W) as [dx, dy], of the
@@ -91,23 +74,28 @@ class ExportedNetworks(nn.Module):
         return tuple(answers)
 
 
-def export_model(run: Path, out: Path, device: str = "cpu") -> ExportedModel:
+def export_model(
+    run: Path, out: Path, device: str = "cpu", max_disparity: int | None = None
+) -> ExportedModel:
     """Write `stereoforge.onnx` with the regressor of a run folder, and its ConfNet and GradNet if it has them.
 
-    The model takes images of any size that is a multiple of 64. Before the file is kept, onnxruntime runs it on two
-    sizes, and the outputs are compared with torch's.
+    The model takes images of any size that is a multiple of the regressor's stride. Before the file is kept,
+    onnxruntime runs it on two sizes, and the outputs are compared with torch's.
 
     Args:
         run: Run folder.
         out: Folder for the file.
         device: What torch computes the outputs on that are compared, as `training.devices.parse_device` takes it.
+        max_disparity: Largest disparity in pixels that the model looks for, at every image size; None leaves it to the
+            regressor.
 
     Raises:
         TrainingError: no regressor, no such device, damaged weights, a network that ONNX cannot express, or outputs
             that differ.
     """
     chosen = parse_device(device)
-    networks = ExportedNetworks(*StereoPredictor(run).networks).eval()
+    regressor, confnet, gradnet = StereoPredictor(run, max_disparity=max_disparity).networks
+    networks = ExportedNetworks(regressor.exportable(), confnet, gradnet).eval()
     with temporary_folder() as folder:
         written = folder / FILE_NAME
         try:
@@ -128,32 +116,24 @@ def _first_sentence(error: Exception) -> str:
 
 
 def _write(networks: ExportedNetworks, path: Path) -> None:
-    correlation = networks.regressor.correlation
     names = ("left", "right", *networks.outputs)
-    networks.regressor.correlation = ShiftedCorrelation(correlation)  # type: ignore[assignment]
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore"
-            )  # tracing's remarks about checks of shapes, which hold for any size
-            torch.onnx.export(
-                networks,
-                (torch.rand(1, 3, 64, 128), torch.rand(1, 3, 64, 128)),
-                str(path),
-                input_names=list(names[:2]),
-                output_names=list(names[2:]),
-                dynamic_axes={name: {0: "batch", 2: "height", 3: "width"} for name in names},
-                opset_version=OPSET,
-                dynamo=False,
-            )
-    finally:
-        networks.regressor.correlation = correlation
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # tracing's remarks about checks of shapes, which hold for any size
+        torch.onnx.export(
+            networks,
+            (torch.rand(1, 3, 64, 128), torch.rand(1, 3, 64, 128)),
+            str(path),
+            input_names=list(names[:2]),
+            output_names=list(names[2:]),
+            dynamic_axes={name: {0: "batch", 2: "height", 3: "width"} for name in names},
+            opset_version=OPSET,
+            dynamo=False,
+        )
 
 
 def _compare(networks: ExportedNetworks, path: Path, size: tuple[int, int], device: torch.device) -> float:
     import onnxruntime
 
-    assert network_size(*size) == size
     generator = torch.Generator().manual_seed(0)
     left, right = torch.rand(2, 1, 3, *size, generator=generator)
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from training.devices import parse_device
 from training.errors import TrainingError
-from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.networks import ConfNet, GradNet, Regressor
 from training.networks.cost_features import CostFeatures
 from training.networks.inference import estimate
 from training.networks.regressor_free import RegressorFreeInputs, regressor_free_inputs
@@ -41,10 +41,16 @@ class Prediction:
 class StereoPredictor:
     """The networks of a run folder, ready to predict.
 
-    Images are resized to multiples of 64, not padded, as the original network does it. The outputs are resized back.
+    Images of any size are brought to one that the regressor takes (`Regressor.fitting`), and the outputs back.
     """
 
-    def __init__(self, run: Path | str, device: str = "cpu", regressor: str = "regressor") -> None:
+    def __init__(
+        self,
+        run: Path | str,
+        device: str = "cpu",
+        regressor: str = "regressor",
+        max_disparity: int | None = None,
+    ) -> None:
         """Read the regressor, and ConfNet and GradNet if the folder has them.
 
         Args:
@@ -52,15 +58,18 @@ class StereoPredictor:
             device: As `training.devices.parse_device` takes it.
             regressor: `regressor`, or `regressor_f`. The latter's disparity comes without confidence and gradient,
                 since those networks were trained on the features of `regressor`.
+            max_disparity: Largest disparity in pixels to look for; None leaves it to the regressor.
 
         Raises:
-            TrainingError: no regressor, no such device, damaged files, or a ConfNet or GradNet trained on another
-                regressor.
+            TrainingError: no regressor, no such device, damaged files, a ConfNet or GradNet trained on another
+                regressor, or a regressor whose largest disparity cannot be set.
         """
         run = Path(run)
         self._device = parse_device(device)
         stored = load_regressor(run, regressor)
         self._regressor = stored.network.to(self._device)
+        if max_disparity is not None:
+            self._regressor.look_up_to(max_disparity)
         self._confnet: ConfNet | None = None
         self._gradnet: GradNet | None = None
         if regressor == "regressor" and has_weights(run, "confnet"):
@@ -69,7 +78,7 @@ class StereoPredictor:
             self._gradnet = on_regressor(run, "gradnet", load_gradnet(run), stored.sha256).to(self._device)
 
     @property
-    def networks(self) -> tuple[DispNetCorr1D, ConfNet | None, GradNet | None]:
+    def networks(self) -> tuple[Regressor, ConfNet | None, GradNet | None]:
         """The networks, in evaluation mode."""
         return self._regressor, self._confnet, self._gradnet
 

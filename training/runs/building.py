@@ -10,7 +10,8 @@ import torch
 
 from training.data.pipeline import StereoDataModule
 from training.errors import TrainingError
-from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.networks import ConfNet, GradNet, Regressor
+from training.networks.regressors.registry import regressor_for
 from training.presets import (
     ConfNetPreset,
     FineTuningPreset,
@@ -57,7 +58,7 @@ class BuiltTask:
     regressor_sha256: str | None
     """Digest of the regressor that heads are built on; None for the other tasks."""
 
-    def kept_networks(self, name: str) -> dict[str, DispNetCorr1D | ConfNet | GradNet]:
+    def kept_networks(self, name: str) -> dict[str, Regressor | ConfNet | GradNet]:
         """The networks to save, by the names of their files; `name` is the task's."""
         kept = self.task.kept_network
         parts = (kept.confnet, kept.gradnet) if isinstance(kept, JointHeads) else (kept,)
@@ -105,7 +106,7 @@ def _with_networks(plan: RunPlan, module: StereoDataModule) -> BuiltTask:
 
 
 def _head_task(
-    preset: ConfNetPreset | GradNetPreset, regressor: DispNetCorr1D, steps: int, seed: int
+    preset: ConfNetPreset | GradNetPreset, regressor: Regressor, steps: int, seed: int
 ) -> ConfNetTask | GradNetTask:
     if isinstance(preset, ConfNetPreset):
         return ConfNetTask(preset, regressor, ConfNet(preset.network.on(regressor)), steps, seed)
@@ -120,7 +121,7 @@ def _regressor_free_task(
     return RegressorFreeGradNetTask(preset, GradNet(preset.network), steps, seed)
 
 
-def _joint_task(plan: RunPlan, preset: JointPreset, regressor: StoredNetwork[DispNetCorr1D]) -> JointTask:
+def _joint_task(plan: RunPlan, preset: JointPreset, regressor: StoredNetwork[Regressor]) -> JointTask:
     init, refinement = plan.request.init, plan.refinement
     assert init is not None
     assert refinement is not None
@@ -131,12 +132,10 @@ def _joint_task(plan: RunPlan, preset: JointPreset, regressor: StoredNetwork[Dis
     return JointTask(preset, regressor.network, heads.train(), refinement, plan.steps, plan.request.seed)
 
 
-def _regressor_to_train(
-    preset: RegressorPreset, module: StereoDataModule, init: Path | None
-) -> DispNetCorr1D:
+def _regressor_to_train(preset: RegressorPreset, module: StereoDataModule, init: Path | None) -> Regressor:
     """A new regressor that knows the data's mean colour, or the one of the run folder `init`."""
     if init is None:
-        network = DispNetCorr1D(preset.network)
+        network: Regressor = regressor_for(preset.network)(preset.network)
         network.image_mean.copy_(torch.from_numpy(module.image_mean()))
         return network
     network = load_regressor(init).network

@@ -35,10 +35,8 @@ def _scaled_schedules(preset: Preset, done: int, before: int, now: int) -> list[
     changes = []
     if rates[0] != rates[1]:
         changes.append(f"the learning rate is {rates[1]:.3g} there instead of {rates[0]:.3g}")
-    if isinstance(preset, RegressorPreset) and preset.stage_ends:
-        ends = [
-            ", ".join(str(round(end * n / preset.steps)) for end in preset.stage_ends) for n in (before, now)
-        ]
+    if isinstance(preset, RegressorPreset) and preset.objective.stage_ends:
+        ends = [", ".join(str(round(end * n)) for end in preset.objective.stage_ends) for n in (before, now)]
         changes.append(f"the loss's stages end at {ends[1]} instead of {ends[0]}")
     if preset.fixed_statistics:
         fixed = [n - round(preset.fixed_statistics * n) for n in (before, now)]

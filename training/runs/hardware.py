@@ -63,4 +63,7 @@ def faster_layout(module: nn.Module) -> None:
 
     All feature maps follow, and training on a CPU is about a tenth faster.
     """
-    module.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    formats = {4: torch.channels_last, 5: torch.channels_last_3d}
+    for parameter in module.parameters():
+        if parameter.dim() in formats:
+            parameter.data = parameter.data.to(memory_format=formats[parameter.dim()])

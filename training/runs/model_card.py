@@ -7,13 +7,13 @@ from pathlib import Path
 
 from stereoforge_kit.files import write_text
 from training.presets import TASKS
-from training.runs.weights import TrainingSummary, has_weights, read_summary, weights_path
+from training.runs.weights import TrainingSummary, has_weights, read_summary, regressor_title, weights_path
 
 FILE_NAME = "model_card.md"
 """Name of the model card in a run folder."""
 _WHAT = {
-    "regressor": "DispNetCorr1D: disparity of the left view from a rectified pair",
-    "regressor_f": "DispNetCorr1D fine-tuned on disparity gradients too (eq. 9 of the paper)",
+    "regressor": "{title}: disparity of the left view from a rectified pair",
+    "regressor_f": "{title} fine-tuned on disparity gradients too (eq. 9 of the paper)",
     "confnet": "ConfNet: the probability that a disparity of `regressor` is correct",
     "gradnet": "GradNet: forward differences of the disparity",
     "confnet_free": "Regressor-free ConfNet: for the disparity of any predictor",
@@ -33,6 +33,11 @@ _FIGURES = {
     "auc_random": "area of a random order",
     "auc_optimal": "area of the best order",
 }
+
+
+def _what(run: Path, task: str) -> str:
+    said = _WHAT[task]
+    return said.format(title=regressor_title(run, task)) if "{title}" in said else said
 
 
 def write_model_card(run: Path, folder: Path | None = None) -> Path:
@@ -57,7 +62,7 @@ def write_model_card(run: Path, folder: Path | None = None) -> Path:
     ]
     for task in TASKS:
         if has_weights(run, task):
-            lines += ["", f"## {weights_path(run, task).name}", "", f"{_WHAT[task]}.", ""]
+            lines += ["", f"## {weights_path(run, task).name}", "", f"{_what(run, task)}.", ""]
             lines += _describe(read_summary(run, task))
     lines += [
         "",

@@ -11,6 +11,7 @@ from refine.methods.ours import Ours
 from training.data.pipeline import DEFAULT_CACHE_BYTES, Source
 from training.errors import TrainingError
 from training.presets import (
+    DEFAULT_NETWORK,
     JointPreset,
     Preset,
     RegressorFreeConfNetPreset,
@@ -40,6 +41,8 @@ class TrainingRequest:
     """Name of one of the task's presets, or a preset of your own."""
     validation: tuple[str | Path, ...] = ()
     """Data sets whose frames decide which weights are kept, instead of the val splits of `data`."""
+    network: str = DEFAULT_NETWORK
+    """`regressor` with the name of a preset: which network, as `training.networks.regressors.registry` knows it."""
     changes: Mapping[str, Any] = field(default_factory=dict)
     """Other values for some of the preset's fields."""
     pseudo_labels: Path | None = None
@@ -129,7 +132,7 @@ def plan_run(request: TrainingRequest) -> RunPlan:
 def _changed_preset(request: TrainingRequest) -> tuple[Preset, str]:
     """The preset with the request's changes, and both in words."""
     if isinstance(request.preset, str):
-        preset, name = find_preset(request.task, request.preset), request.preset
+        preset, name = find_preset(request.task, request.preset, request.network), request.preset
     else:
         preset, name = request.preset, "custom"
     if request.changes:

@@ -21,11 +21,12 @@ from torch import Tensor, nn
 
 from stereoforge_kit.files import write_bytes, write_text
 from training.errors import TrainingError
-from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
+from training.networks import ConfNet, GradNet, HeadConfig, Regressor
+from training.networks.regressors.registry import find_regressor
 
 Network = TypeVar("Network", bound=nn.Module)
-"""DispNetCorr1D, ConfNet or GradNet."""
-FORMAT = 1
+"""A regressor, ConfNet or GradNet."""
+FORMAT = 2
 """Version of the descriptions, which other versions refuse."""
 MAX_DESCRIPTION_BYTES = 1 << 20
 """Larger descriptions are refused unread."""
@@ -76,7 +77,7 @@ def weights_path(run: Path, task: str) -> Path:
 def save_weights(
     run: Path,
     task: str,
-    network: DispNetCorr1D | ConfNet | GradNet,
+    network: Regressor | ConfNet | GradNet,
     training: TrainingSummary,
     regressor_sha256: str | None = None,
 ) -> None:
@@ -96,16 +97,28 @@ def save_weights(
         "task": task,
         "sha256": hashlib.sha256(content).hexdigest(),
         "regressor_sha256": regressor_sha256,
-        "network": asdict(network.config),
+        "network": _described(network),
         "training": asdict(training),
     }
     write_bytes(weights_path(run, task), content)
     write_text(run / f"{task}.json", json.dumps(description, indent=2) + "\n")
 
 
-def load_regressor(run: Path, task: str = "regressor") -> StoredNetwork[DispNetCorr1D]:
+def _described(network: Regressor | ConfNet | GradNet) -> dict[str, Any]:
+    """A network's options and, of a regressor, its name."""
+    name = {"name": network.name} if isinstance(network, Regressor) else {}
+    return {**name, **asdict(network.config)}
+
+
+def load_regressor(run: Path, task: str = "regressor") -> StoredNetwork[Regressor]:
     """Read `regressor` or `regressor_f` of a run folder. Raises TrainingError for missing or damaged files."""
-    return _load(run, task, lambda config: DispNetCorr1D(_structure(config, DispNetConfig)))
+    return _load(run, task, _build_regressor)
+
+
+def _build_regressor(described: Mapping[str, Any]) -> Regressor:
+    options = dict(described)
+    regressor = find_regressor(options.pop("name"))
+    return regressor(_structure(options, regressor.config_type))
 
 
 def load_confnet(run: Path, task: str = "confnet") -> StoredNetwork[ConfNet]:
@@ -139,6 +152,19 @@ def read_summary(run: Path, task: str) -> TrainingSummary:
     except ValueError as error:
         raise TrainingError(f"{path}: does not describe a trained network ({error})") from error
     return summary
+
+
+def regressor_title(run: Path, task: str) -> str:
+    """The name in words of a run folder's `regressor` or `regressor_f`.
+
+    Raises:
+        TrainingError: a missing or damaged description.
+    """
+    path = run / f"{task}.json"
+    try:
+        return find_regressor(_read_description(path, task)["network"]["name"]).title
+    except (KeyError, TypeError) as error:
+        raise TrainingError(f"{path}: does not say which regressor it describes") from error
 
 
 def copy_weights(source: Path, target: Path, task: str) -> None:
@@ -179,7 +205,7 @@ def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -
             network = build(description["network"])
         _fill(network, safetensors.torch.load(content))
         training = _structure(description["training"], TrainingSummary)
-    except (SafetensorError, RuntimeError, KeyError, ValueError, TypeError) as error:
+    except (SafetensorError, RuntimeError, KeyError, ValueError, TypeError, TrainingError) as error:
         raise TrainingError(
             f"{path}: does not hold the {task} that {description_path.name} describes ({_first_line(error)})"
         ) from error

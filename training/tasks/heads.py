@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from training.data.batch import StereoBatch
-from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.networks import ConfNet, GradNet, Regressor
 from training.networks.inference import estimate, head_inputs
 from training.presets import ConfNetPreset, GradNetPreset, Preset
 from training.tasks.base import StereoTask
@@ -18,7 +18,7 @@ from training.tasks.head_objectives import ConfidenceTask, GradientTask
 class HeadTask(StereoTask):
     """Training of heads on a frozen regressor."""
 
-    def __init__(self, preset: Preset, regressor: DispNetCorr1D, steps: int, seed: int) -> None:
+    def __init__(self, preset: Preset, regressor: Regressor, steps: int, seed: int) -> None:
         """As `StereoTask`, with the regressor, whose parameters are frozen."""
         super().__init__(preset, steps, seed)
         self.regressor = regressor.requires_grad_(False).eval()
@@ -34,7 +34,7 @@ class ConfNetTask(HeadTask, ConfidenceTask):
     """`confnet`: ConfNet on the regressor's disparity and features."""
 
     def __init__(
-        self, preset: ConfNetPreset, regressor: DispNetCorr1D, network: ConfNet, steps: int, seed: int
+        self, preset: ConfNetPreset, regressor: Regressor, network: ConfNet, steps: int, seed: int
     ) -> None:
         """As `HeadTask`, with the network to train."""
         super().__init__(preset, regressor, steps, seed)
@@ -60,7 +60,7 @@ class GradNetTask(HeadTask, GradientTask):
     initial = "regressor"
 
     def __init__(
-        self, preset: GradNetPreset, regressor: DispNetCorr1D, network: GradNet, steps: int, seed: int
+        self, preset: GradNetPreset, regressor: Regressor, network: GradNet, steps: int, seed: int
     ) -> None:
         """As `HeadTask`, with the network to train."""
         super().__init__(preset, regressor, steps, seed)

@@ -25,7 +25,7 @@ from training.metrics import (
     gradient_error,
     sparsification_auc,
 )
-from training.networks import ConfNet, DispNetCorr1D, GradNet
+from training.networks import ConfNet, GradNet, Regressor
 from training.networks.inference import HeadInputs, estimate, head_inputs
 from training.presets import JointPreset
 from training.tasks.base import image_of, map_of
@@ -56,7 +56,7 @@ class JointTask(HeadTask):
     def __init__(
         self,
         preset: JointPreset,
-        regressor: DispNetCorr1D,
+        regressor: Regressor,
         network: JointHeads,
         refinement: Ours,
         steps: int,

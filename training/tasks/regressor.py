@@ -1,4 +1,4 @@
-"""Training DispNetCorr1D: from scratch with losses at all scales, and fine-tuning with eq. 9."""
+"""Training a regressor: from scratch with its own objective, and fine-tuning with eq. 9."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from torch import Tensor, nn
 
 from stereoforge_kit.viewing import Picture, disparity_picture, error_picture, side_by_side
 from training.data.batch import StereoBatch
-from training.losses import gradient_aware_l1, multiscale_l1, stage_weights
+from training.losses import gradient_aware_l1
 from training.metrics import bad_pixel_rate, end_point_error, forward_gradient, gradient_error
-from training.networks import DispNetCorr1D, full_resolution
-from training.networks.inference import estimate
+from training.networks import Regressor
+from training.networks.inference import estimate, regress
 from training.presets import FineTuningPreset, RegressorPreset
 from training.tasks.base import StereoTask, image_of, map_of
 
@@ -22,11 +22,11 @@ SMOOTH_WITHIN_PX = 1.0
 
 class _DisparityTask(StereoTask):
     monitor = "validation/epe"
-    network: DispNetCorr1D
+    network: Regressor
 
     def decayed_parameters(self) -> Iterable[nn.Parameter]:
-        """The weights of the encoder's convolutions."""
-        return self.network.contracting_weights()
+        """Those that the network names."""
+        return self.network.decayed_parameters()
 
     def validate_frame(self, batch: StereoBatch) -> tuple[dict[str, float], dict[str, Tensor]]:
         """End-point error, bad-pixel rates and gradient error of the disparity."""
@@ -55,26 +55,24 @@ class _DisparityTask(StereoTask):
 
 
 class RegressorTask(_DisparityTask):
-    """`regressor`: multi-scale L1 with a schedule of the scales' weights (Mayer et al. 2016)."""
+    """`regressor`: the objective of the preset."""
 
-    def __init__(self, preset: RegressorPreset, network: DispNetCorr1D, steps: int, seed: int) -> None:
+    def __init__(self, preset: RegressorPreset, network: Regressor, steps: int, seed: int) -> None:
         """As `StereoTask`, with the network to train."""
         super().__init__(preset, steps, seed)
         self.network = network
-        self.stages = preset.loss_stages
-        self.stage_ends = [round(end * steps / preset.steps) for end in preset.stage_ends]
+        self.objective = preset.objective
 
     def loss(self, batch: StereoBatch) -> Tensor:
-        """`multiscale_l1` of a batch with the weights of the current step."""
-        predictions = self.network(batch.left, batch.right).disparities
-        weights = stage_weights(self.global_step, self.stages, self.stage_ends)
-        return multiscale_l1(predictions, batch.disparity, weights)
+        """The objective of a batch at this point of the run."""
+        output = self.network(batch.left, batch.right)
+        return self.objective(output, batch.disparity, self.global_step / self.steps)
 
 
 class FineTuningTask(_DisparityTask):
-    """`regressor_f`: eq. 9 on the finest disparity, at full resolution."""
+    """`regressor_f`: eq. 9 on the disparity at full resolution."""
 
-    def __init__(self, preset: FineTuningPreset, network: DispNetCorr1D, steps: int, seed: int) -> None:
+    def __init__(self, preset: FineTuningPreset, network: Regressor, steps: int, seed: int) -> None:
         """As `StereoTask`, with the network to train."""
         super().__init__(preset, steps, seed)
         self.network = network
@@ -82,6 +80,5 @@ class FineTuningTask(_DisparityTask):
 
     def loss(self, batch: StereoBatch) -> Tensor:
         """`gradient_aware_l1` of a batch."""
-        finest = self.network(batch.left, batch.right).disparities[-1]
-        prediction = full_resolution(finest, batch.left.shape[-2:])
+        prediction = regress(self.network, batch.left, batch.right).disparity
         return gradient_aware_l1(prediction, batch.disparity, self.gradient_weight)

@@ -35,7 +35,7 @@ def tiny_presets() -> dict[str, Preset]:
     """Presets whose crops fit tiny frames."""
     return {
         task: replace(
-            find_preset(task, "tiny"),
+            find_preset(task, "tiny", "dispnet"),
             crop_width=SIZE[0],
             crop_height=SIZE[1],
             batch_size=1,

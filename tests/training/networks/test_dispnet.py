@@ -124,7 +124,7 @@ def test_initialization(network: DispNetCorr1D) -> None:
 
 
 def test_decays_the_contracting_weights_only(network: DispNetCorr1D) -> None:
-    decayed = {id(p) for p in network.contracting_weights()}
+    decayed = {id(p) for p in network.decayed_parameters()}
     names = {name for name, p in network.named_parameters() if id(p) in decayed}
     contracting = [name for name in TABLE if name.startswith("conv")]
     assert names == {f"{name}.0.weight" for name in contracting}

@@ -12,7 +12,8 @@ from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from tests.training.prediction.test_predictor import edit_description, save_run
 from training.errors import TrainingError
 from training.networks import ConfNet, Correlation1D
-from training.prediction.onnx_export import ShiftedCorrelation, export_model
+from training.networks.correlation import ShiftedCorrelation1D
+from training.prediction.onnx_export import export_model
 from training.prediction.predictor import StereoPredictor
 from training.runs.model_card import write_model_card
 
@@ -21,13 +22,13 @@ from training.runs.model_card import write_model_card
 def test_the_exported_correlation_is_the_same_function(one_sided: bool) -> None:
     correlation = Correlation1D(5, one_sided)
     left, right = torch.randn(2, 1, 4, 3, 17)
-    torch.testing.assert_close(ShiftedCorrelation(correlation)(left, right), correlation(left, right))
+    torch.testing.assert_close(ShiftedCorrelation1D(correlation)(left, right), correlation(left, right))
 
 
-@pytest.mark.parametrize("heads", [True, False])
-def test_onnx_says_what_the_predictor_says(heads: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("network", "heads"), [("dispnet", True), ("dispnet", False), ("costvolume", True)])
+def test_onnx_says_what_the_predictor_says(network: str, heads: bool, tmp_path: Path) -> None:
     """At sizes that the graph was not traced with."""
-    save_run(tmp_path)
+    save_run(tmp_path, network)
     if not heads:
         for name in ("confnet", "gradnet"):
             (tmp_path / f"{name}.safetensors").unlink()
@@ -44,7 +45,8 @@ def test_onnx_says_what_the_predictor_says(heads: bool, tmp_path: Path) -> None:
             for n, i in (("left", left), ("right", right))
         },
     )
-    expected = StereoPredictor(tmp_path).predict(left, right)
+    reach = 192 if network == "costvolume" else None  # the range of the exported model, whatever the size
+    expected = StereoPredictor(tmp_path, max_disparity=reach).predict(left, right)
     np.testing.assert_allclose(answers[0][0, 0], expected.disparity, atol=1e-3)
     if heads:
         assert expected.gradient is not None

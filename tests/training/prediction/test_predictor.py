@@ -11,9 +11,19 @@ import torch
 from torch import Tensor, nn
 
 from training.errors import TrainingError
-from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, DispNetOutput, GradNet, HeadConfig
+from training.networks import (
+    ConfNet,
+    CostVolumeConfig,
+    DispNetConfig,
+    DispNetCorr1D,
+    GradNet,
+    HeadConfig,
+    Regressor,
+)
 from training.networks.cost_features import CostFeatures
 from training.networks.inference import estimate
+from training.networks.regressors.interface import Fitting, Regression, RegressorConfig, Resizing
+from training.networks.regressors.registry import regressor_for
 from training.prediction.predictor import StereoPredictor
 from training.runs.weights import TrainingSummary, load_gradnet, load_regressor, read_summary, save_weights
 
@@ -22,11 +32,15 @@ SUMMARY = TrainingSummary(
     fingerprints=("4 frames, recipe abc",), revision="0.1.0 (cafe)",
 )  # fmt: skip
 CONFIG = DispNetConfig(width=0.0625, normalization="batch")
+NARROW: dict[str, RegressorConfig] = {
+    "dispnet": CONFIG,
+    "costvolume": CostVolumeConfig(stem=4, encoder=(8, 8, 8), aggregation=(4, 4, 4), look_channels=8),
+}
 
 
-def save_run(run: Path) -> tuple[DispNetCorr1D, ConfNet, GradNet]:
+def save_run(run: Path, network: str = "dispnet") -> tuple[Regressor, ConfNet, GradNet]:
     torch.manual_seed(0)
-    regressor = DispNetCorr1D(CONFIG)
+    regressor = regressor_for(NARROW[network])(NARROW[network])
     regressor(torch.rand(2, 3, 64, 64), torch.rand(2, 3, 64, 64))  # moves BatchNorm's statistics
     save_weights(run, "regressor", regressor, SUMMARY)
     head = HeadConfig(width=4, hidden=4).on(regressor)
@@ -44,8 +58,11 @@ def images() -> tuple[np.ndarray, np.ndarray]:
     return left, right
 
 
-def test_what_was_saved_predicts_the_same(tmp_path: Path, images: tuple[np.ndarray, np.ndarray]) -> None:
-    networks = save_run(tmp_path)
+@pytest.mark.parametrize("network", NARROW)
+def test_what_was_saved_predicts_the_same(
+    network: str, tmp_path: Path, images: tuple[np.ndarray, np.ndarray]
+) -> None:
+    networks = save_run(tmp_path, network)
     tensors = (torch.from_numpy(image).permute(2, 0, 1)[None].float() / 255 for image in images)
     expected = estimate(*networks, *tensors)
     got = StereoPredictor(tmp_path).predict(*images)
@@ -95,15 +112,20 @@ class PlaneOracle(nn.Module):
     def stretch(self, view: Tensor) -> tuple[float, float]:
         return view.shape[-1] / self.size[1], view.shape[-2] / self.size[0]
 
-    def forward(self, left: Tensor, right: Tensor) -> DispNetOutput:  # noqa: ARG002
+    def fitting(self, height: int, width: int) -> Fitting:
+        return Resizing(height, width, 64)
+
+    def regression(self, disparity: Tensor) -> Regression:
+        features = torch.zeros(1, 1, 2, 2)
+        return Regression(disparity, {"joined": features, "decoded": features})
+
+    def forward(self, left: Tensor, right: Tensor) -> Tensor:  # noqa: ARG002
         self.seen.append(tuple(left.shape))
         stretch_x, stretch_y = self.stretch(left)
         a, b, c = self.plane
         x = (torch.arange(left.shape[-1]) + 0.5) / stretch_x
         y = (torch.arange(left.shape[-2])[:, None] + 0.5) / stretch_y
-        disparity = stretch_x * (a + b * x + c * y)
-        features = torch.zeros(1, 1, 2, 2)
-        return DispNetOutput((disparity[None, None],), features, features)
+        return (stretch_x * (a + b * x + c * y))[None, None]
 
 
 class SlopeOracle(PlaneOracle):
@@ -116,7 +138,7 @@ class SlopeOracle(PlaneOracle):
         assert cost_features.disparity.shape == (1, 1, *cost_features.left.shape[-2:])
         return cost_features.left, features
 
-    def forward(self, left: Tensor, features: Tensor) -> Tensor:  # type: ignore[override]  # noqa: ARG002
+    def forward(self, left: Tensor, features: Tensor) -> Tensor:  # noqa: ARG002
         stretch_x, stretch_y = self.stretch(left)
         _, b, c = self.plane
         slopes = left.new_tensor([b, c * stretch_x / stretch_y]).view(1, 2, 1, 1)
@@ -170,10 +192,11 @@ def edit_description(run: Path, task: str, **changes: object) -> None:
 def test_weights_that_do_not_fit_their_description_are_refused(tmp_path: Path) -> None:
     save_run(tmp_path)
     for network, reason in (
-        ({"width": 0.125, "normalization": "batch"}, "size mismatch"),
-        ({"width": "wide"}, "could not convert|invalid value"),
-        ({"depth": 3}, "extra fields|depth"),
-        ({"normalization": "group"}, "normalization"),
+        ({"name": "dispnet", "width": 0.125, "normalization": "batch"}, "size mismatch"),
+        ({"name": "dispnet", "width": "wide"}, "could not convert|invalid value"),
+        ({"name": "dispnet", "depth": 3}, "extra fields|depth"),
+        ({"name": "dispnet", "normalization": "group"}, "normalization"),
+        ({"name": "psmnet"}, "there is no network 'psmnet'; there are costvolume, dispnet"),
     ):
         edit_description(tmp_path, "regressor", network=network)
         with pytest.raises(TrainingError, match=reason):

@@ -48,7 +48,7 @@ class _Answers(RegressorTask):
     """A task whose network's error on each frame is known beforehand."""
 
     def __init__(self) -> None:
-        preset: Any = find_preset("regressor", "tiny")
+        preset: Any = find_preset("regressor", "tiny", "dispnet")
         network: Any = torch.nn.Identity()
         super().__init__(preset, network, steps=1, seed=0)
 

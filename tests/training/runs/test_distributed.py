@@ -24,18 +24,21 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_two_processes_make_the_run_of_one_with_double_batch(data: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("network", ["dispnet", "costvolume"])
+def test_two_processes_make_the_run_of_one_with_double_batch(
+    network: str, data: Path, tmp_path: Path
+) -> None:
     command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
     program = Path(__file__).parents[1] / "short_run.py"
     done = subprocess.run(
-        [*command, program, data, tmp_path / "two", "2", str(STEPS)],
+        [*command, program, network, data, tmp_path / "two", "2", str(STEPS)],
         env={"PYTHONPATH": str(program.parents[2]), "PATH": "/usr/bin:/bin", "OMP_NUM_THREADS": "1"},
         capture_output=True,
         text=True,
         timeout=600,
     )
     assert done.returncode == 0, done.stderr[-3000:]
-    run(data, tmp_path / "one", 4, STEPS)
+    run(network, data, tmp_path / "one", 4, STEPS)
 
     losses = [scalars(tmp_path / name, "regressor", "train/loss") for name in ("one", "two")]
     assert losses[0].keys() == losses[1].keys() == {9, 19}

@@ -23,7 +23,7 @@ def test_killed_at_random_moments(tmp_path: Path) -> None:
     context.set_forkserver_preload(["tests.training.short_run"])
 
     def start(out: Path) -> multiprocessing.process.BaseProcess:
-        process = context.Process(target=run, args=(data, out, 1, STEPS, True))
+        process = context.Process(target=run, args=("dispnet", data, out, 1, STEPS, True))
         process.start()
         return process
 

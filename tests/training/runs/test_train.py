@@ -37,24 +37,37 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_dataset(tmp_path_factory.mktemp("set"), 0, train=4, val=2)
 
 
-def quick(task: str, **changes: object) -> Preset:
+def quick(task: str, network: str = "dispnet", **changes: object) -> Preset:
     """The tiny preset on small crops."""
     small = {"crop_width": 128, "crop_height": 64, "batch_size": 4, "validation_interval": 4}
-    return replace(find_preset(task, "tiny"), **(small | changes))  # type: ignore[arg-type]
+    return replace(find_preset(task, "tiny", network), **(small | changes))  # type: ignore[arg-type]
 
 
-def quick_regressor(**changes: object) -> RegressorPreset:
-    preset = quick("regressor", **changes)
+NARROW: dict[str, dict[str, object]] = {
+    "dispnet": {"width": 0.0625},
+    "costvolume": {"stem": 4, "encoder": (8, 8, 8), "aggregation": (4, 4, 4), "look_channels": 8},
+}
+
+
+def quick_regressor(network: str = "dispnet", **changes: object) -> RegressorPreset:
+    preset = quick("regressor", network, **changes)
     assert isinstance(preset, RegressorPreset)
-    return replace(preset, network=replace(preset.network, width=0.0625))
+    return replace(preset, network=replace(preset.network, **NARROW[network]))
 
 
 @pytest.fixture(scope="module")
-def run(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run folder with a regressor of a few steps."""
-    folder = tmp_path_factory.mktemp("run")
-    train_quietly("regressor", [(data, 1.0)], folder, quick_regressor(), steps=6)
-    return folder
+def runs(data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """For each network, a run folder with a regressor of a few steps."""
+    folders = {network: tmp_path_factory.mktemp(network) for network in NARROW}
+    for network, folder in folders.items():
+        train_quietly("regressor", [(data, 1.0)], folder, quick_regressor(network), steps=6)
+    return folders
+
+
+@pytest.fixture(scope="module")
+def run(runs: dict[str, Path]) -> Path:
+    """The run folder of a DispNetCorr1D."""
+    return runs["dispnet"]
 
 
 def weights(run: Path, task: str) -> dict[str, torch.Tensor]:
@@ -120,15 +133,18 @@ def test_overfits_four_samples(data: Path, tmp_path: Path) -> None:
     assert final["gradnet"] < 0.04
 
 
+@pytest.mark.parametrize("network", ["dispnet", "costvolume"])
 @pytest.mark.parametrize("task", ["regressor", "regressor_f", "confnet", "gradnet"])
-def test_resumed_equals_uninterrupted(task: str, data: Path, run: Path, tmp_path: Path) -> None:
+def test_resumed_equals_uninterrupted(
+    task: str, network: str, data: Path, runs: dict[str, Path], tmp_path: Path
+) -> None:
     """Stopped by an exception in the middle of a block and resumed: the same weights, bit for bit."""
-    preset = quick_regressor() if task == "regressor" else quick(task)
+    preset = quick_regressor(network) if task == "regressor" else quick(task)
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     for folder in (whole, broken):
         folder.mkdir()
         if task != "regressor":
-            for file in run.glob("regressor.*"):
+            for file in runs[network].glob("regressor.*"):
                 shutil.copy(file, folder)
     train_quietly(task, [(data, 1.0)], whole, preset, steps=11, seed=3)
 

@@ -169,10 +169,16 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def quick(task: str) -> Preset:
     preset = replace(
-        find_preset(task, "tiny"), crop_width=128, crop_height=64, batch_size=2, validation_interval=3
+        find_preset(task, "tiny", "dispnet"),
+        crop_width=128,
+        crop_height=64,
+        batch_size=2,
+        validation_interval=3,
     )
     if isinstance(preset, RegressorPreset):
-        return replace(preset, network=replace(preset.network, width=0.0625))
+        return replace(
+            preset, network=DispNetConfig(width=0.0625, normalization="batch", prediction_scale=16.0)
+        )
     return replace(preset, augmentation=NO_AUGMENTATION)
 
 

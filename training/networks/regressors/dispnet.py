@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import copy
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -10,23 +11,28 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
-from training.networks.correlation import Correlation1D
+from training.losses import STAGE_WEIGHTS, ScaleWeights, multiscale_l1, stage_weights
+from training.networks.correlation import Correlation1D, ShiftedCorrelation1D
+from training.networks.regressors.interface import (
+    FeatureKind,
+    Fitting,
+    Objective,
+    Regression,
+    Regressor,
+    RegressorConfig,
+    Resizing,
+)
 
 LEAKY_SLOPE = 0.1
 """Slope of LeakyReLU below zero (the original network definition)."""
 CONVOLUTION_WEIGHT = "0.weight"
 """Name of the convolution's weight in what `activated` returns."""
-STRIDE = 64
-"""Width and height of the input must be multiples of this."""
-
 Normalization = Literal["none", "batch"]
 """Of the convolutions: none, as in the original, or BatchNorm."""
-FeatureKind = Literal["joined", "decoded"]
-"""What "the last concatenated matching features" of the paper are: iconv1's input, as the words say, or its output."""
 
 
 @dataclass(frozen=True)
-class DispNetConfig:
+class DispNetConfig(RegressorConfig):
     """Options of the network. The defaults are the original network definition; all else is ours."""
 
     width: float = 1.0
@@ -134,7 +140,20 @@ class ExpandingStage(nn.Module):
         return features, finer, joined
 
 
-class DispNetCorr1D(nn.Module):
+@dataclass(frozen=True)
+class MultiscaleObjective(Objective):
+    """L1 at all scales, with weights that change from stage to stage (Mayer et al. 2016)."""
+
+    stages: tuple[ScaleWeights, ...] = STAGE_WEIGHTS
+    """Weights of the six scales' losses, one row per stage."""
+
+    def __call__(self, output: DispNetOutput, disparity: Tensor, progress: float) -> Tensor:
+        """`multiscale_l1` of a batch with the weights of the current stage."""
+        weights = stage_weights(progress, self.stages, self.stage_ends)
+        return multiscale_l1(output.disparities, disparity, weights)
+
+
+class DispNetCorr1D(Regressor):
     """Disparity from a rectified pair: two shared convolutions, a 1-D correlation, an encoder and a decoder.
 
     `DispNetCorr1D()` is the network as its authors released it (Mayer et al., CVPR 2016): 42,430,107 parameters, of
@@ -151,13 +170,16 @@ class DispNetCorr1D(nn.Module):
         torch.Size([1, 7, 32, 64])
     """
 
-    image_mean: Tensor
-    """(3,) mean colour of the training set in 0..1, which is subtracted from both images."""
+    name = "dispnet"
+    title = "DispNetCorr1D"
+    config_type = DispNetConfig
+    stride = 64
 
     def __init__(self, config: DispNetConfig | None = None) -> None:
         """Make the network with new weights; without a config, the original's."""
-        super().__init__()
-        self.config = config = config or DispNetConfig()
+        self.config: DispNetConfig
+        config = config or DispNetConfig()
+        super().__init__(config)
 
         def conv(in_channels: int, out_channels: int, kernel: int, stride: int) -> nn.Sequential:
             layer = nn.Conv2d(in_channels, out_channels, kernel, stride, kernel // 2)
@@ -166,9 +188,10 @@ class DispNetCorr1D(nn.Module):
         c32, c64, c128, c256, c512, c1024 = (scaled(c, config.width) for c in (32, 64, 128, 256, 512, 1024))
         self.conv1 = conv(3, c64, 7, 2)
         self.conv2 = conv(c64, c128, 5, 2)
-        self.correlation = Correlation1D(config.max_displacement, config.one_sided)
+        correlation = Correlation1D(config.max_displacement, config.one_sided)
+        self.correlation: Correlation1D | ShiftedCorrelation1D = correlation
         self.conv_redir = conv(c128, c64, 1, 1)
-        self.conv3 = conv(self.correlation.out_channels + c64, c256, 5, 2)
+        self.conv3 = conv(correlation.out_channels + c64, c256, 5, 2)
         self.conv3_1 = conv(c256, c256, 3, 1)
         self.conv4 = conv(c256, c512, 3, 2)
         self.conv4_1 = conv(c512, c512, 3, 1)
@@ -186,7 +209,7 @@ class DispNetCorr1D(nn.Module):
         self.register_buffer("image_mean", torch.full((3,), 0.4))
         initialize(self)
 
-    def contracting_weights(self) -> list[nn.Parameter]:
+    def decayed_parameters(self) -> Iterable[nn.Parameter]:
         """Weights of the encoder's convolutions (the contracting part), the only ones with weight decay in the
         original."""
         parts = [self.conv1, self.conv2, self.conv_redir, self.conv3, self.conv3_1, self.conv4, self.conv4_1]
@@ -202,11 +225,7 @@ class DispNetCorr1D(nn.Module):
         Raises:
             ValueError: the images differ in size, or a size is no multiple of 64.
         """
-        if left.shape != right.shape or left.shape[-1] % STRIDE or left.shape[-2] % STRIDE:
-            raise ValueError(
-                f"DispNetCorr1D needs two images of one size, a multiple of {STRIDE} each way; got "
-                f"{tuple(left.shape)} and {tuple(right.shape)}"
-            )
+        self.check_images(left, right)
         batch = left.shape[0]
         mean = self.image_mean.view(1, 3, 1, 1)
         views1 = self.conv1(torch.cat([left, right]) - mean)
@@ -231,6 +250,28 @@ class DispNetCorr1D(nn.Module):
             features=torch.cat([joined[:, :-1], scale * joined[:, -1:]], dim=1),
             decoded=features,
         )
+
+    def regression(self, output: DispNetOutput) -> Regression:
+        """The finest disparity at full resolution, and iconv1's input and output as features.
+
+        The paper's "last concatenated matching features" are iconv1's input, as the words say, or its output.
+        """
+        size = [2 * length for length in output.features.shape[-2:]]
+        disparity = F.relu(full_resolution(output.disparities[-1], size))
+        return Regression(disparity, {"joined": output.features, "decoded": output.decoded})
+
+    def fitting(self, height: int, width: int) -> Fitting:
+        """Images are resized to multiples of 64, not padded, as the original network does."""
+        return Resizing(height, width, self.stride)
+
+    def exportable(self) -> DispNetCorr1D:
+        """The network with its correlation as shifted products, whose graph is the same for every image size."""
+        correlation = self.correlation
+        assert isinstance(correlation, Correlation1D)
+        network = copy.copy(self)
+        network._modules = dict(self._modules)
+        network.correlation = ShiftedCorrelation1D(correlation)
+        return network
 
 
 def in_full_precision(layer: nn.Module, maps: Tensor) -> Tensor:

@@ -1,0 +1,210 @@
+"""CostVolumeNet as built: its layers, its range, and what it answers for pictures of any size."""
+
+import pytest
+import torch
+import torch.nn.functional as F  # noqa: N812
+from torch import nn
+
+from training.errors import TrainingError
+from training.losses import disparity_smooth_l1, level_cross_entropy
+from training.networks import CostVolumeConfig, CostVolumeNet, DispNetConfig, DispNetCorr1D
+from training.networks.inference import estimate, regress
+from training.networks.regressors.costvolume import CostVolumeObjective
+from training.networks.regressors.registry import find_regressor, known_regressors, regressor_for
+
+HEIGHT, WIDTH = 64, 128
+NARROW = CostVolumeConfig(stem=4, encoder=(8, 8, 8), aggregation=(4, 4, 4), look_channels=8)
+
+# name: kernel, stride, dilation, in, out, denominator of the output's resolution
+TABLE = {
+    "descriptors.stem.0": (3, 2, 1, 3, 16, 2),
+    "descriptors.stem.1": (3, 1, 1, 16, 16, 2),
+    "descriptors.down4.0": (3, 2, 1, 16, 32, 4),
+    "descriptors.down4.1.first": (3, 1, 1, 32, 32, 4),
+    "descriptors.down4.1.second": (3, 1, 1, 32, 32, 4),
+    "descriptors.down8.0": (3, 2, 1, 32, 48, 8),
+    "descriptors.down8.1.first": (3, 1, 1, 48, 48, 8),
+    "descriptors.down8.1.second": (3, 1, 1, 48, 48, 8),
+    "descriptors.down16.0": (3, 2, 1, 48, 64, 16),
+    "descriptors.down16.1.first": (3, 1, 1, 64, 64, 16),
+    "descriptors.down16.1.second": (3, 1, 1, 64, 64, 16),
+    "descriptors.up8": (3, 1, 1, 112, 48, 8),
+    "descriptors.up4": (3, 1, 1, 80, 32, 4),
+    "descriptors.describe_quarter": (1, 1, 1, 32, 32, 4),
+    "descriptors.context": (3, 1, 1, 48, 24, 2),
+    "descriptors.describe_half": (1, 1, 1, 24, 16, 2),
+    "aggregation.enter4": (3, 1, 1, 4, 8, 4),
+    "aggregation.enter8.0": (3, 2, 1, 8, 16, 8),
+    "aggregation.enter8.1": (3, 1, 1, 16, 16, 8),
+    "aggregation.enter16.0": (3, 2, 1, 16, 32, 16),
+    "aggregation.enter16.1": (3, 1, 1, 32, 32, 16),
+    "aggregation.enter16.2": (3, 1, 1, 32, 32, 16),
+    "aggregation.gate4": (1, 1, 1, 32, 8, 4),
+    "aggregation.gate8": (1, 1, 1, 48, 16, 8),
+    "aggregation.gate16": (1, 1, 1, 64, 32, 16),
+    "aggregation.narrow16": (1, 1, 1, 32, 16, 16),
+    "aggregation.leave8": (3, 1, 1, 16, 16, 8),
+    "aggregation.narrow8": (1, 1, 1, 16, 8, 8),
+    "aggregation.leave4": (3, 1, 1, 8, 8, 4),
+    "aggregation.score": (1, 1, 1, 8, 1, 4),
+    "half_weights.0": (3, 1, 1, 32, 32, 4),
+    "half_weights.1": (1, 1, 1, 32, 36, 4),
+    "look.layers.0": (3, 1, 1, 58, 32, 2),
+    "look.layers.1.first": (3, 1, 1, 32, 32, 2),
+    "look.layers.1.second": (3, 1, 1, 32, 32, 2),
+    "look.layers.2": (3, 1, 2, 32, 32, 2),
+    "look.layers.3.first": (3, 1, 1, 32, 32, 2),
+    "look.layers.3.second": (3, 1, 1, 32, 32, 2),
+    "look.layers.4": (3, 1, 4, 32, 32, 2),
+    "look.layers.5.first": (3, 1, 1, 32, 32, 2),
+    "look.layers.5.second": (3, 1, 1, 32, 32, 2),
+    "look.decide": (3, 1, 1, 32, 8, 2),
+    "look.weights.0": (3, 1, 1, 24, 32, 2),
+    "look.weights.1": (1, 1, 1, 32, 36, 2),
+}
+
+
+def test_the_layers_are_those_of_the_table() -> None:
+    """Read off the running network: kernels, strides, channels and resolutions of every convolution."""
+    network, found = CostVolumeNet().eval(), {}
+
+    def note(name: str, layer: nn.Conv2d | nn.Conv3d, output: torch.Tensor) -> None:
+        kernel, stride, dilation = layer.kernel_size[0], layer.stride[0], layer.dilation[0]
+        scale = HEIGHT // output.shape[2]
+        found[name] = kernel, stride, dilation, layer.in_channels, layer.out_channels, scale
+
+    for name, layer in network.named_modules():
+        if isinstance(layer, nn.Conv2d | nn.Conv3d):
+            layer.register_forward_hook(lambda layer, _, output, name=name: note(name, layer, output))
+    with torch.no_grad():
+        network(*torch.rand(2, 1, 3, HEIGHT, WIDTH))
+    assert {
+        name.removesuffix(".0") if name not in TABLE else name: row for name, row in found.items()
+    } == TABLE
+    assert sum(p.numel() for p in network.parameters()) == 471_897
+    parts = {name: sum(p.numel() for p in part.parameters()) for name, part in network.named_children()}
+    assert parts == {"descriptors": 266_832, "aggregation": 93_113, "half_weights": 10_468, "look": 101_484}
+
+
+def test_a_new_network_begins_with_the_volumes_disparity() -> None:
+    torch.manual_seed(0)
+    output = CostVolumeNet(NARROW)(*torch.rand(2, 2, 3, 32, 64))
+    torch.testing.assert_close(output.coarse, output.disparity)
+
+
+@pytest.mark.parametrize(("height", "width"), [(50, 70), (64, 64), (17, 131), (1, 40), (40, 1)])
+def test_pictures_of_any_size_are_padded_not_resized(height: int, width: int) -> None:
+    """The answer is that for the picture with its last row and column repeated, cut back."""
+    torch.manual_seed(0)
+    network = CostVolumeNet(NARROW).eval()
+    left, right = torch.rand(2, 1, 3, height, width)
+    rows = torch.arange(-(-height // 16) * 16).clamp(max=height - 1)
+    columns = torch.arange(-(-width // 16) * 16).clamp(max=width - 1)
+    with torch.no_grad():
+        whole = regress(network, left[:, :, rows][..., columns], right[:, :, rows][..., columns]).disparity
+    found = estimate(network, None, None, left, right).disparity
+    torch.testing.assert_close(found, whole[..., :height, :width])
+
+
+def test_the_range_can_be_set_and_changes_no_weights() -> None:
+    network = CostVolumeNet(NARROW).eval()
+    left, right = torch.rand(2, 1, 3, 32, 160)
+    assert network(left, right).scores.shape[-1] == 80 // 4
+    network.look_up_to(100)
+    assert network(left, right).scores.shape[-1] == 112 // 4
+    with pytest.raises(TrainingError, match="must be positive"):
+        network.look_up_to(0)
+    with pytest.raises(TrainingError, match="as far as it was trained to"):
+        DispNetCorr1D(DispNetConfig(width=0.0625)).look_up_to(100)
+
+
+@pytest.mark.parametrize(
+    ("width", "pixels"), [(16, 32), (320, 160), (450, 192), (1248, 192), (1920, 240), (2960, 368)]
+)
+def test_the_range_suits_the_width(width: int, pixels: int) -> None:
+    assert CostVolumeNet(NARROW).disparity_range(width) == pixels
+
+
+def test_wide_pictures_are_searched_at_half_their_size_and_looked_at_at_full() -> None:
+    network = CostVolumeNet(NARROW).eval()
+    left, right = torch.rand(2, 1, 3, 48, 144)
+    whole = network(left, right)
+    network.widest_volume_px = 80
+    output = network(left, right)
+    assert whole.scores.shape == (1, 12, 36, 16)
+    assert output.scores.shape == (
+        1,
+        8,
+        20,
+        8,
+    )  # 24x72, padded to multiples of 16; half the range, in levels of 4
+    assert output.disparity.shape == whole.disparity.shape == (1, 1, 48, 144)
+    assert output.joined.shape == whole.joined.shape
+
+
+def test_the_wrong_size_is_refused() -> None:
+    with pytest.raises(ValueError, match="multiple of 16"):
+        CostVolumeNet(NARROW)(*torch.rand(2, 1, 3, 32, 40))
+
+
+def test_regressors_are_found_by_name_and_by_their_options() -> None:
+    assert known_regressors() == {"costvolume": CostVolumeNet, "dispnet": DispNetCorr1D}
+    assert regressor_for(NARROW) is CostVolumeNet
+    with pytest.raises(TrainingError, match="there are costvolume, dispnet"):
+        find_regressor("psmnet")
+
+
+def test_ground_truth_beyond_the_range_and_without_a_value_counts_nothing() -> None:
+    torch.manual_seed(0)
+    network, objective = CostVolumeNet(NARROW), CostVolumeObjective()
+    output = network(*torch.rand(2, 1, 3, 32, 64))
+    truth = torch.rand(1, 1, 32, 64) * 20
+    partial = truth.clone()
+    partial[..., :8] = torch.nan
+    beyond = partial.clone()
+    beyond[..., :8] = 500.0
+    assert objective(output, partial, 0.0) == objective(output, beyond, 0.0)
+    assert objective(output, torch.full_like(truth, torch.nan), 0.0) == 0
+
+
+def test_the_best_scores_are_those_of_the_target() -> None:
+    """Cross-entropy is least where the softmax is the Laplacian itself."""
+    truth = torch.full((1, 1, 8, 12), 3.3)
+    levels = torch.arange(6.0)
+    own = -(levels - 3.3).abs() / 0.5
+    at_best = level_cross_entropy(own.expand(1, 2, 3, 6), truth, 0.5)
+    for shift in (0.3 * torch.randn(6, generator=torch.Generator().manual_seed(k)) for k in range(5)):
+        assert level_cross_entropy((own + shift).expand(1, 2, 3, 6), truth, 0.5) > at_best
+
+
+def test_smooth_l1_is_squared_near_zero_and_linear_beyond() -> None:
+    truth = torch.tensor([1.0, 2.0, torch.nan]).view(1, 1, 1, 3)
+    prediction = torch.tensor([1.2, 5.0, 9.0]).view(1, 1, 1, 3)
+    expected = (0.2**2 / (2 * 0.5) + (3.0 - 0.5 / 2)) / 2
+    assert float(disparity_smooth_l1(prediction, truth, 0.5)) == pytest.approx(expected)
+
+
+def test_it_learns_a_shift() -> None:
+    """Noise that a pair shows moved by one disparity: after a few steps most pixels are right."""
+    torch.manual_seed(0)
+    network, objective = CostVolumeNet(NARROW).train(), CostVolumeObjective()
+    optimizer = torch.optim.Adam(network.parameters(), 3e-3)
+    generator = torch.Generator().manual_seed(1)
+
+    def batch() -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        coarse, fine = (torch.rand(2, 3, *size, generator=generator) for size in ((8, 32), (32, 128)))
+        right = 0.7 * F.interpolate(coarse, scale_factor=4, mode="bilinear") + 0.3 * fine
+        shift = int(torch.randint(0, 40, (1,), generator=generator))
+        return right.roll(shift, -1), right, torch.full((2, 1, 32, 128), float(shift))
+
+    for _ in range(160):
+        left, right, truth = batch()
+        optimizer.zero_grad()
+        objective(network(left, right), truth, 0.0).backward()
+        optimizer.step()
+    with torch.no_grad():
+        errors = []
+        for _ in range(5):
+            left, right, truth = batch()
+            errors.append((regress(network, left, right).disparity - truth)[..., 40:].abs() < 1)
+    assert torch.stack(errors).float().mean() > 0.8

@@ -1,0 +1,462 @@
+"""CostVolumeNet: disparity by matching in a cost volume (ours).
+
+After GC-Net (Kendall et al., ICCV 2017), PSMNet (Chang and Chen, CVPR 2018) and GwcNet (Guo et al., CVPR 2019), at a
+fraction of their size. Where DispNetCorr1D remembers what worlds look like, a network that compares transfers to
+photographs.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from torch import Tensor, nn
+
+from training.errors import TrainingError
+from training.losses import disparity_smooth_l1, level_cross_entropy
+from training.networks.cost_volume import (
+    NEIGHBOURS,
+    convex_upsample,
+    cosine_volume,
+    normalized_groups,
+    read_out,
+    windowed_cosines,
+)
+from training.networks.regressors.interface import (
+    FeatureKind,
+    Objective,
+    Regression,
+    Regressor,
+    RegressorConfig,
+)
+
+LEAKY_SLOPE = 0.1
+"""Slope of LeakyReLU below zero."""
+CELL = 4
+"""Full-resolution pixels in a pixel of the volume, each way, and in one of its levels."""
+CERTAINTY_CHANNELS = 3
+"""Channels of the certainty in `Readout`."""
+LARGEST_DISPARITY_PX = 192
+"""Disparities below this are looked for in images of ordinary size, as the field does."""
+READOUT_REACH = 2
+"""Levels on either side of the best that the read-out's expectation is taken over."""
+
+
+@dataclass(frozen=True)
+class CostVolumeConfig(RegressorConfig):
+    """Options of the network. The defaults are the preset `small` (472,000 parameters)."""
+
+    stem: int = 16
+    """Channels at 1/2."""
+    encoder: tuple[int, int, int] = (32, 48, 64)
+    """Channels at 1/4, 1/8 and 1/16."""
+    descriptor_groups: int = 4
+    """Groups of the descriptor at 1/4, each of which gives one volume of cosines."""
+    group_channels: int = 8
+    """Channels of a group, at 1/4 and at 1/2."""
+    aggregation: tuple[int, int, int] = (8, 16, 32)
+    """Channels of the 3-D convolutions at 1/4, 1/8 and 1/16."""
+    look_groups: int = 2
+    """Groups of the descriptor at 1/2."""
+    look_reach: int = 3
+    """Half-resolution pixels on either side of the volume's disparity that the second look compares."""
+    look_channels: int = 32
+    """Channels of the second look."""
+
+
+class CostVolumeOutput(NamedTuple):
+    """The outputs of one forward pass."""
+
+    scores: Tensor
+    """(B, H/4, W/4, D) logits of the disparities 0, 4, 8, ... px."""
+    coarse: Tensor
+    """(B, 1, H, W) px: the volume's disparity."""
+    disparity: Tensor
+    """(B, 1, H, W) px after the second look; not clipped at zero."""
+    joined: Tensor
+    """(B, F, H/2, W/2): what the second look decides from, the volume's certainty, and as the last channel the
+    disparity in pixels."""
+    decoded: Tensor
+    """(B, F, H/2, W/2): the second look's last features."""
+
+
+@dataclass(frozen=True)
+class CostVolumeObjective(Objective):
+    """Smooth L1 of both disparities, and cross-entropy of the volume."""
+
+    cross_entropy: float = 1.0
+    """Weight of the volume's cross-entropy against a Laplacian about the ground truth."""
+    spread_levels: float = 0.5
+    """Scale of the Laplacian, in levels."""
+    coarse_beta_px: float = 1.0
+    """Errors of the volume's disparity below this count by their squares."""
+    beta_px: float = 0.3
+    """Errors of the final disparity below this count by their squares."""
+    mendable_px: float = 8.0
+    """The second look cannot mend larger errors of the volume; such pixels count with weight `unmendable`."""
+    unmendable: float = 0.1
+    """Weight of pixels with larger errors."""
+
+    def __call__(self, output: CostVolumeOutput, disparity: Tensor, progress: float) -> Tensor:
+        """The loss of a batch. Ground truth beyond the volume's largest level is left out."""
+        del progress
+        limit = float(CELL * (output.scores.shape[-1] - 1))
+        truth = torch.where(disparity <= limit, disparity, torch.nan)
+        mendable = (output.coarse.detach() - truth).abs() <= self.mendable_px
+        near, anywhere = torch.where(mendable, truth, torch.nan), self.unmendable
+        return (
+            self.cross_entropy * level_cross_entropy(output.scores, truth / CELL, self.spread_levels)
+            + disparity_smooth_l1(output.coarse, truth, self.coarse_beta_px)
+            + disparity_smooth_l1(output.disparity, near, self.beta_px)
+            + anywhere * disparity_smooth_l1(output.disparity, truth, self.beta_px)
+        )
+
+
+class CostVolumeNet(Regressor):
+    """Disparity from a rectified pair, by a volume of cosines at 1/4 and a second look at 1/2 of the resolution.
+
+    Examples:
+        >>> network = CostVolumeNet().eval()
+        >>> network.look_up_to(64)
+        >>> left, right = torch.rand(2, 1, 3, 32, 96)
+        >>> output = network(left, right)
+        >>> output.scores.shape, output.disparity.shape
+        (torch.Size([1, 8, 24, 16]), torch.Size([1, 1, 32, 96]))
+    """
+
+    name = "costvolume"
+    title = "CostVolumeNet"
+    config_type = CostVolumeConfig
+    stride = 16
+
+    max_disparity: int | None = None
+    """What `look_up_to` set; None chooses by the images' width (`disparity_range`)."""
+    widest_volume_px: int | None = 1600
+    """Wider images are searched at half their size, so that time and memory stay in bounds; None searches all at their
+    own."""
+
+    def __init__(self, config: CostVolumeConfig | None = None) -> None:
+        """Make the network with new weights; without a config, that of `small`."""
+        self.config: CostVolumeConfig
+        config = config or CostVolumeConfig()
+        super().__init__(config)
+        self.descriptors = Descriptors(config)
+        self.aggregation = Aggregation(config)
+        self.half_weights = nn.Sequential(_convolved(config.encoder[0], 32), nn.Conv2d(32, NEIGHBOURS * 4, 1))
+        self.look = SecondLook(config)
+        self.feature_channels: dict[FeatureKind, int] = {
+            "joined": self.look.input_channels + 1,
+            "decoded": config.look_channels,
+        }
+        self.register_buffer("image_mean", torch.full((3,), 0.4))
+        _initialize(self)
+        self.look.begin_without_change()
+
+    def forward(self, left: Tensor, right: Tensor) -> CostVolumeOutput:
+        """Predict the left view's disparity.
+
+        Args:
+            left, right: (B, 3, H, W) in 0..1, H and W multiples of 16.
+
+        Raises:
+            ValueError: the images differ in size, or a size is no multiple of 16.
+        """
+        self.check_images(left, right)
+        images = torch.cat([left, right]) - self.image_mean.view(1, 3, 1, 1)
+        views = self.descriptors(images)
+        matched = self._match(images, views, self.disparity_range(left.shape[-1]))
+        coarse, half = matched.disparity, views.half.chunk(2)
+        context = views.context.chunk(2)[0]
+        seen = self.look(half[0], half[1], context, coarse.detach(), matched.certainty)
+        # Both are upsampled by one set of weights, so that the volume's error trains these from the first step.
+        fine = [2 * convex_upsample(each, seen.weights, 2) for each in (coarse, seen.disparity)]
+        joined = torch.cat([seen.inputs, 2 * seen.disparity.detach()], dim=1)
+        return CostVolumeOutput(matched.scores, fine[0], fine[1], joined, seen.features)
+
+    def _match(self, images: Tensor, views: Views, disparity_range: int) -> Matched:
+        """Search the volume; that of images wider than `widest_volume_px` at half their size, and so on.
+
+        Args:
+            images: (2B, 3, H, W), the left ones first, mean 0.
+            views: What the images are compared by.
+            disparity_range: In pixels.
+        """
+        guides = [maps.chunk(2)[0] for maps in views.guides]
+        weights = self.half_weights(guides[0])
+        if self.widest_volume_px is not None and images.shape[-1] > self.widest_volume_px:
+            small, size = _halved(images, self.stride)
+            below = self._match(small, self.descriptors(small), _whole(disparity_range / 2, self.stride))
+            coarse, certainty = (
+                maps[..., : size[0], : size[1]] for maps in (below.disparity, below.certainty)
+            )
+            return Matched(below.scores, convex_upsample(2 * coarse, weights, 2), _doubled(certainty))
+        left, right = (
+            normalized_groups(view, self.config.descriptor_groups) for view in views.quarter.chunk(2)
+        )
+        scores = self.aggregation(cosine_volume(left, right, disparity_range // CELL), guides)
+        readout = read_out(scores, READOUT_REACH)
+        # At 1/2, disparities are counted in pixels of that resolution.
+        coarse = convex_upsample(readout.disparity * (CELL / 2), weights, 2)
+        return Matched(scores, coarse, _doubled(readout.certainty))
+
+    def look_up_to(self, max_disparity: int) -> None:
+        """Look for disparities from 0 to this many pixels. That changes no weights.
+
+        Raises:
+            TrainingError: the number is not positive.
+        """
+        if max_disparity < 1:
+            raise TrainingError(f"the largest disparity must be positive, not {max_disparity} px")
+        self.max_disparity = max_disparity
+
+    def exportable(self) -> CostVolumeNet:
+        """The network with one scale and one disparity range for every image size, 0 to 192 px where none was set."""
+        network = copy.copy(self)
+        network.max_disparity = self.max_disparity or LARGEST_DISPARITY_PX
+        network.widest_volume_px = None
+        return network
+
+    def disparity_range(self, width: int) -> int:
+        """Disparities from 0 to below this many pixels are looked for, a multiple of 16.
+
+        Where nothing was set, it is half of the width, but at most 192 px or, in wide images, an eighth
+        of the width.
+
+        Args:
+            width: Of the images, in pixels.
+
+        Examples:
+            >>> CostVolumeNet().disparity_range(320), CostVolumeNet().disparity_range(1248)
+            (160, 192)
+        """
+        wanted = self.max_disparity
+        if wanted is None:
+            wanted = min(width // 2, max(LARGEST_DISPARITY_PX, width // 8)) // self.stride * self.stride
+        return max(_whole(wanted, self.stride), 2 * self.stride)
+
+    def regression(self, output: CostVolumeOutput) -> Regression:
+        """The disparity after the second look, and its features."""
+        features: dict[FeatureKind, Tensor] = {"joined": output.joined, "decoded": output.decoded}
+        return Regression(F.relu(output.disparity), features)
+
+
+class Views(NamedTuple):
+    """What both views are compared by; the left ones first in the batch."""
+
+    quarter: Tensor
+    """(2B, C, H/4, W/4) descriptors."""
+    half: Tensor
+    """(2B, C, H/2, W/2) descriptors."""
+    context: Tensor
+    """(2B, 24, H/2, W/2) features for upsampling and the second look."""
+    guides: tuple[Tensor, Tensor, Tensor]
+    """Features at 1/4, 1/8 and 1/16, which gate the volume."""
+
+
+class Descriptors(nn.Module):
+    """Features of one view: an encoder to 1/16, a decoder to 1/4, and descriptors at 1/4 and 1/2."""
+
+    CONTEXT = 24
+    """Channels of `Views.context`."""
+
+    def __init__(self, config: CostVolumeConfig) -> None:
+        super().__init__()
+        c2, (c4, c8, c16) = config.stem, config.encoder
+        self.stem = nn.Sequential(_convolved(3, c2, stride=2), _convolved(c2, c2))
+        self.down4 = nn.Sequential(_convolved(c2, c4, stride=2), Residual(c4))
+        self.down8 = nn.Sequential(_convolved(c4, c8, stride=2), Residual(c8))
+        self.down16 = nn.Sequential(_convolved(c8, c16, stride=2), Residual(c16))
+        self.up8 = _convolved(c16 + c8, c8)
+        self.up4 = _convolved(c8 + c4, c4)
+        self.describe_quarter = nn.Conv2d(c4, config.descriptor_groups * config.group_channels, 1)
+        self.context = _convolved(c2 + c4, self.CONTEXT)
+        self.describe_half = nn.Conv2d(self.CONTEXT, config.look_groups * config.group_channels, 1)
+
+    def forward(self, views: Tensor) -> Views:
+        """Describe views (2B, 3, H, W)."""
+        at2 = self.stem(views)
+        at4 = self.down4(at2)
+        at8 = self.down8(at4)
+        at16 = self.down16(at8)
+        at8 = self.up8(torch.cat([_doubled(at16), at8], dim=1))
+        at4 = self.up4(torch.cat([_doubled(at8), at4], dim=1))
+        context = self.context(torch.cat([at2, _doubled(at4)], dim=1))
+        return Views(self.describe_quarter(at4), self.describe_half(context), context, (at4, at8, at16))
+
+
+class Aggregation(nn.Module):
+    """A 3-D hourglass over rows, columns and levels, gated at each scale by the left view's features."""
+
+    def __init__(self, config: CostVolumeConfig) -> None:
+        super().__init__()
+        a4, a8, a16 = config.aggregation
+        g4, g8, g16 = config.encoder
+        self.enter4 = _convolved3d(config.descriptor_groups, a4)
+        self.enter8 = nn.Sequential(_convolved3d(a4, a8, stride=2), _convolved3d(a8, a8))
+        self.enter16 = nn.Sequential(
+            _convolved3d(a8, a16, stride=2), _convolved3d(a16, a16), _convolved3d(a16, a16)
+        )
+        self.gate4, self.gate8 = nn.Conv2d(g4, a4, 1), nn.Conv2d(g8, a8, 1)
+        self.gate16 = nn.Conv2d(g16, a16, 1)
+        self.narrow16, self.leave8 = nn.Conv3d(a16, a8, 1), _convolved3d(a8, a8)
+        self.narrow8, self.leave4 = nn.Conv3d(a8, a4, 1), _convolved3d(a4, a4)
+        self.score = nn.Conv3d(a4, 1, 1)
+
+    def forward(self, volume: Tensor, guides: list[Tensor]) -> Tensor:
+        """Scores (B, h, w, D) of a volume (B, G, h, w, D); h, w and D are multiples of 4.
+
+        Args:
+            volume: The cosines.
+            guides: The left view's features at 1/4, 1/8 and 1/16.
+        """
+        gates = [
+            torch.sigmoid(gate(guide))[..., None]
+            for gate, guide in zip((self.gate4, self.gate8, self.gate16), guides, strict=True)
+        ]
+        at4 = self.enter4(volume) * gates[0]
+        at8 = self.enter8(at4) * gates[1]
+        at16 = self.enter16(at8) * gates[2]
+        at8 = self.leave8(at8 + _doubled(self.narrow16(at16)))
+        at4 = self.leave4(at4 + _doubled(self.narrow8(at8)))
+        scores: Tensor = self.score(at4)[:, 0]
+        return scores.float()
+
+
+class Matched(NamedTuple):
+    """What the volume says, at 1/2 of the resolution."""
+
+    scores: Tensor
+    """(B, h, w, D), as in `CostVolumeOutput`; of a smaller image if the images are wide."""
+    disparity: Tensor
+    """(B, 1, H/2, W/2) in pixels of this resolution."""
+    certainty: Tensor
+    """(B, 3, H/2, W/2), as in `Readout`."""
+
+
+class LookOutput(NamedTuple):
+    """What the second look says, at 1/2 of the resolution."""
+
+    disparity: Tensor
+    """(B, 1, h, w) in pixels of this resolution."""
+    weights: Tensor
+    """(B, 36, h, w), for `convex_upsample` to full resolution."""
+    inputs: Tensor
+    """(B, F, h, w): what it decided from."""
+    features: Tensor
+    """(B, F, h, w): its last features."""
+
+
+class SecondLook(nn.Module):
+    """Compares the views at 1/2 around the volume's disparity, where half a pixel can be seen."""
+
+    def __init__(self, config: CostVolumeConfig) -> None:
+        super().__init__()
+        self.groups, self.reach = config.look_groups, config.look_reach
+        offsets = 2 * config.look_reach + 1
+        channels = config.look_channels
+        self.input_channels = (
+            config.look_groups * (offsets + config.group_channels)
+            + Descriptors.CONTEXT
+            + CERTAINTY_CHANNELS
+            + 1
+        )
+        self.layers = nn.Sequential(
+            _convolved(self.input_channels, channels),
+            Residual(channels),
+            _convolved(channels, channels, dilation=2),
+            Residual(channels),
+            _convolved(channels, channels, dilation=4),
+            Residual(channels),
+        )
+        self.decide = nn.Conv2d(channels, offsets + 1, 3, 1, 1)
+        self.weights = nn.Sequential(_convolved(Descriptors.CONTEXT, 32), nn.Conv2d(32, NEIGHBOURS * 4, 1))
+
+    def begin_without_change(self) -> None:
+        """Set the weights of the decision to 0, so that the volume's disparity stays as it is."""
+        nn.init.zeros_(self.decide.weight)
+
+    def forward(
+        self, left: Tensor, right: Tensor, context: Tensor, disparity: Tensor, certainty: Tensor
+    ) -> LookOutput:
+        """Look again.
+
+        Args:
+            left, right: (B, C, h, w) descriptors.
+            context: (B, 24, h, w) features of the left view.
+            disparity: (B, 1, h, w) of the volume, in pixels of this resolution.
+            certainty: (B, 3, h, w) of the volume.
+        """
+        grouped = [normalized_groups(view, self.groups) for view in (left, right)]
+        products = windowed_cosines(grouped[0], grouped[1], disparity, self.reach)
+        scaled = disparity / 32  # of the size of the other inputs
+        inputs = torch.cat([products, left, context, certainty, scaled], dim=1)
+        features = self.layers(inputs)
+        decision = self.decide(features).float()
+        offsets = torch.arange(-self.reach, self.reach + 1, device=left.device, dtype=decision.dtype)
+        shift = (decision[:, :-1].softmax(1) * offsets[:, None, None]).sum(1, keepdim=True)
+        return LookOutput(
+            disparity + shift + decision[:, -1:], self.weights(context).float(), inputs, features
+        )
+
+
+class Residual(nn.Module):
+    """Two 3x3 convolutions, added to their input."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.first = _convolved(channels, channels)
+        self.second = nn.Sequential(
+            nn.Conv2d(channels, channels, 3, 1, 1, bias=False), nn.BatchNorm2d(channels)
+        )
+
+    def forward(self, maps: Tensor) -> Tensor:
+        """Of the same shape."""
+        return F.leaky_relu(maps + self.second(self.first(maps)), LEAKY_SLOPE)
+
+
+def _convolved(in_channels: int, channels: int, stride: int = 1, dilation: int = 1) -> nn.Sequential:
+    """A 3x3 convolution, BatchNorm and LeakyReLU."""
+    return nn.Sequential(
+        nn.Conv2d(in_channels, channels, 3, stride, dilation, dilation, bias=False),
+        nn.BatchNorm2d(channels),
+        nn.LeakyReLU(LEAKY_SLOPE, inplace=True),
+    )
+
+
+def _convolved3d(in_channels: int, channels: int, stride: int = 1) -> nn.Sequential:
+    """A 3x3x3 convolution, BatchNorm and LeakyReLU."""
+    return nn.Sequential(
+        nn.Conv3d(in_channels, channels, 3, stride, 1, bias=False),
+        nn.BatchNorm3d(channels),
+        nn.LeakyReLU(LEAKY_SLOPE, inplace=True),
+    )
+
+
+def _doubled(maps: Tensor) -> Tensor:
+    """Every pixel, and every level of a volume, twice each way."""
+    return F.interpolate(maps, scale_factor=2.0, mode="nearest")
+
+
+def _whole(length: float, unit: int) -> int:
+    """The next multiple of a unit."""
+    return math.ceil(length / unit) * unit
+
+
+def _halved(images: Tensor, stride: int) -> tuple[Tensor, tuple[int, int]]:
+    """Images (B, C, H, W) at half their size, padded to multiples of a stride, and (H/4, W/4)."""
+    height, width = images.shape[-2] // 2, images.shape[-1] // 2
+    missing = (0, _whole(width, stride) - width, 0, _whole(height, stride) - height)
+    return F.pad(F.avg_pool2d(images, 2), missing, mode="replicate"), (height // 2, width // 2)
+
+
+def _initialize(network: nn.Module) -> None:
+    """He initialisation; biases 0."""
+    for layer in network.modules():
+        if isinstance(layer, nn.Conv2d | nn.Conv3d):
+            nn.init.kaiming_normal_(layer.weight, a=LEAKY_SLOPE)
+            if layer.bias is not None:
+                nn.init.zeros_(layer.bias)
