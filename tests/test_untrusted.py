@@ -16,7 +16,7 @@ from datagen.errors import DatasetError
 from datagen.recipe.recipe import read_recipe
 from stereoforge_kit.processes import call_limited
 from training.errors import TrainingError
-from training.runs.weights import load_regressor
+from training.runs.weights import FORMAT, load_regressor
 
 PACKAGES = ("scenes", "datagen", "training", "refine", "stereoforge_kit", "stereoforge")
 FORBIDDEN_MODULES = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
@@ -137,7 +137,7 @@ def write_weights(run: Path, network: dict[str, object], tensors: bytes) -> None
     run.mkdir()
     (run / "regressor.safetensors").write_bytes(tensors)
     description = {
-        "format": 1,
+        "format": FORMAT,
         "task": "regressor",
         "sha256": hashlib.sha256(tensors).hexdigest(),
         "regressor_sha256": None,
@@ -153,12 +153,15 @@ HEADER = json.dumps({"a": {"dtype": "F32", "shape": [2**40], "data_offsets": [0,
 @pytest.mark.parametrize(
     ("network", "tensors"),
     [
-        ({"width": 1e5}, struct.pack("<Q", 2) + b"{}"),
-        ({"max_displacement": 10**12}, struct.pack("<Q", 2) + b"{}"),
-        ({}, struct.pack("<Q", 2**62)),
-        ({}, struct.pack("<Q", len(HEADER)) + HEADER),
-        ({}, b"\x80\x04\x95 a pickle, not tensors"),
-        ({}, b""),
+        ({"name": "dispnet", "width": 1e5}, struct.pack("<Q", 2) + b"{}"),
+        ({"name": "dispnet", "max_displacement": 10**12}, struct.pack("<Q", 2) + b"{}"),
+        ({"name": "costvolume", "stem": 10**9}, struct.pack("<Q", 2) + b"{}"),
+        ({"name": "dispnet"}, struct.pack("<Q", 2**62)),
+        ({"name": "dispnet"}, struct.pack("<Q", len(HEADER)) + HEADER),
+        ({"name": "dispnet"}, b"\x80\x04\x95 a pickle, not tensors"),
+        ({"name": "dispnet"}, b""),
+        ({"name": "os"}, struct.pack("<Q", 2) + b"{}"),
+        ({}, struct.pack("<Q", 2) + b"{}"),
     ],
 )
 def test_weights_that_declare_more_than_they_hold(

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from stereoforge.bundled_weights import BUNDLED_WEIGHTS
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS, named_weights
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import check_max_disparity, parse_methods, several, shown
 from stereoforge.places import keep_apart
@@ -30,7 +30,7 @@ class Evaluate:
     out: Annotated[Path, shown("REPORT")]
     """Folder for the report."""
     weights: Annotated[Path, shown("RUN", "the bundled weights")] = BUNDLED_WEIGHTS
-    """Run folder of the networks."""
+    """Run folder of the networks. paper: the bundled networks of the paper."""
     split: Literal["train", "val", "test"] = "test"
     """Which split of the data sets; those without splits are taken whole."""
     methods: Annotated[str, shown("LIST", "all there are")] = ""
@@ -60,6 +60,7 @@ class Evaluate:
     def run(self) -> None:
         """Predict, refine and score every frame, then write the report."""
         methods = parse_methods(self.methods)
+        run = named_weights(self.weights)
         if not self.data:
             raise UsageError("evaluate needs at least one data set")
         if self.bad_threshold is not None and not self.bad_threshold > 0:
@@ -93,11 +94,11 @@ class Evaluate:
         parse_device(self.device)
         data = open_test_data(self.data, self.split, skip_broken=self.skip_broken)
         submission = find_submission(self.data) if self.submission else None
-        settings = open_settings(self.parameters, self.weights, self.predictor)
-        predictors = open_predictors(self.weights, self.device, self.predictor, self.max_disparity)
+        settings = open_settings(self.parameters, run, self.predictor)
+        predictors = open_predictors(run, self.device, self.predictor, self.max_disparity)
         rows = settings.rows(methods)
-        lacking = untrained(rows, self.weights, self.predictor)
-        notes = untrained_notes(lacking, self.weights, self.predictor)
+        lacking = untrained(rows, run, self.predictor)
+        notes = untrained_notes(lacking, run, self.predictor)
         if len(lacking) == len(rows):
             raise CommandError("; ".join(notes))
         sets = [
@@ -114,9 +115,9 @@ class Evaluate:
             "Parameters": describe_settings(settings),
             "Command": shlex.join(["stereoforge", *sys.argv[1:]]),
         }
-        files = report_evaluation(sets, self.weights, self.out, facts=facts, bootstrap_seed=self.seed)
+        files = report_evaluation(sets, run, self.out, facts=facts, bootstrap_seed=self.seed)
         if self.predictor == "sgbm":
-            notes += fallback_notes(self.weights)
+            notes += fallback_notes(run)
         skipped = sets[0].evaluation.skipped
         for note in (*notes, *(reason for name, reason in skipped.items() if name not in lacking)):
             console.print(note, markup=False, soft_wrap=True)

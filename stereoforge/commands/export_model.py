@@ -8,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from stereoforge.bundled_weights import named_weights
 from stereoforge.inputs.flag_values import check_max_disparity, shown
 from stereoforge.progress import console
 
@@ -21,7 +22,7 @@ class ExportModel:
     """
 
     run_folder: Annotated[tyro.conf.Positional[Path], shown("RUN")]
-    """Run folder of the networks."""
+    """Run folder of the networks. paper: the bundled networks of the paper."""
     out: Annotated[Path, shown("DIR")]
     """Folder for stereoforge.onnx and the model card."""
     max_disparity: Annotated[int | None, shown("PX", "192 for CostVolumeNet")] = None
@@ -36,8 +37,9 @@ class ExportModel:
         from training.runs.model_card import write_model_card
 
         check_max_disparity(self.max_disparity)
-        exported = export_model(self.run_folder, self.out, self.device, self.max_disparity)
-        write_model_card(self.run_folder, self.out)
+        run = named_weights(self.run_folder)
+        exported = export_model(run, self.out, self.device, self.max_disparity)
+        write_model_card(run, self.out)
         console.print(
             f"{exported.path}: {', '.join(exported.outputs)}; onnxruntime agrees with torch to "
             f"{exported.largest_difference:.1g}",

@@ -10,7 +10,7 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from stereoforge.bundled_weights import BUNDLED_WEIGHTS
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS, named_weights
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import check_max_disparity, shown
 from stereoforge.inputs.images import pair_doubts, read_color_images
@@ -60,8 +60,8 @@ class Refine:
     out: Annotated[Path, shown("DIR")]
     """Folder for the results."""
     weights: Annotated[Path, shown("RUN", "the bundled weights")] = BUNDLED_WEIGHTS
-    """Run folder with a regressor, a confnet and a gradnet; for another predictor's disparity, a confnet_free and a
-    gradnet_free."""
+    """Run folder with a regressor, a confnet and a gradnet, or with confnet_free and gradnet_free, which judge any
+    predictor's disparity. paper: the bundled networks of the paper."""
     disparity: Annotated[Path | None, shown("FILE", "none")] = None
     """Disparity of the left view in pixels to refine instead of predicting one: PFM (NaN, infinite, negative or
     wider than the picture where there is none) or 16-bit PNG as KITTI has it (value / 256, 0 where there is none)."""
@@ -85,6 +85,7 @@ class Refine:
     def run(self) -> None:
         """Refine the pair and write every output into the folder."""
         self._check()
+        run = named_weights(self.weights)
         left, right, remarks = read_color_images(self.left, self.right)
         remarks += (odd := pair_doubts(left, right))
         from stereoforge.inputs.disparity_files import read_disparity
@@ -101,12 +102,12 @@ class Refine:
                 remarks += said
             given = disparity, other
         predictor: Literal["networks", "sgbm"] = "sgbm" if given is not None else self.predictor
-        settings = open_settings(self.parameters, self.weights, predictor)
+        settings = open_settings(self.parameters, run, predictor)
         method = settings.ours
         if self.form is not None:
             method = replace(settings.ours_quadratic, form=self.form)
         prediction, notes = predict_pair(
-            left, right, given, self.weights, self.device, self.predictor, self.max_disparity
+            left, right, given, run, self.device, self.predictor, self.max_disparity
         )
         assert prediction.confidence is not None
         assert prediction.gradient is not None

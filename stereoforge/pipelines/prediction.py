@@ -37,10 +37,43 @@ class PairPredictor(Protocol):
 
 
 @dataclass(frozen=True)
-class MatchingPredictor:
-    """Semi-global matching, or a given disparity, judged by the regressor-free networks or by heuristics."""
+class Judge:
+    """The regressor-free networks of a run folder, or heuristics where it has none."""
 
     networks: RegressorFreePredictor
+
+    def judge(self, left: Image, right: Image, disparity: Map, disparity_right: Map) -> Prediction:
+        """Confidence and gradients of a disparity (H, W), whose holes are filled from the background."""
+        judged = self.networks.predict(left, right, disparity, disparity_right)
+        confidence, gradient = judged.confidence, judged.gradient
+        if confidence is None:
+            consistency = left_right_consistency(disparity, disparity_right)
+            confidence = consistency_confidence(disparity, consistency, left)
+        if gradient is None:
+            gradient = local_gradients(disparity, confidence, left)
+        return Prediction(fill_background(disparity), confidence, gradient)
+
+
+@dataclass(frozen=True)
+class JudgedRegressor(Judge):
+    """A regressor without heads of its own, judged by the regressor-free networks."""
+
+    regressor: StereoPredictor
+
+    def predict(self, left: Image, right: Image) -> Prediction:
+        """The regressor's disparity of both views, and what the networks say of it."""
+        disparity = self.regressor.predict(left, right).disparity
+        return self.judge(left, right, disparity, self.predict_right(left, right))
+
+    def predict_right(self, left: Image, right: Image) -> Map:
+        """The regressor's disparity (H, W) px of the right view."""
+        return self.regressor.predict_right(left, right)
+
+
+@dataclass(frozen=True)
+class MatchingPredictor(Judge):
+    """Semi-global matching, or a given disparity, judged by the regressor-free networks or by heuristics."""
+
     matcher: SGBMParameters
 
     def predict(self, left: Image, right: Image) -> Prediction:
@@ -57,19 +90,6 @@ class MatchingPredictor:
             matcher = replace(self.matcher, max_disparity_px=min(reach, left.shape[1]))
             disparity_right = match_both(left, right, matcher)[1]
         return self.judge(left, right, disparity, disparity_right)
-
-    def judge(self, left: Image, right: Image, disparity: Map, disparity_right: Map) -> Prediction:
-        """Confidence and gradients by the networks, or by heuristics where there are none.
-
-        Holes are filled from the background."""
-        judged = self.networks.predict(left, right, disparity, disparity_right)
-        confidence, gradient = judged.confidence, judged.gradient
-        if confidence is None:
-            consistency = left_right_consistency(disparity, disparity_right)
-            confidence = consistency_confidence(disparity, consistency, left)
-        if gradient is None:
-            gradient = local_gradients(disparity, confidence, left)
-        return Prediction(fill_background(disparity), confidence, gradient)
 
 
 @dataclass(frozen=True)
@@ -118,7 +138,7 @@ class Predictors:
 
     def _forest_confidence(self, sample: StereoFrame, prediction: Prediction) -> Map:
         assert self.forest is not None
-        assert isinstance(self.initial, StereoPredictor)
+        assert isinstance(self.initial, StereoPredictor | JudgedRegressor)
         consistency = left_right_consistency(
             prediction.disparity, self.initial.predict_right(sample.left, sample.right)
         )
@@ -148,24 +168,45 @@ def open_predictors(
     if has_weights(run, "regressor_f"):
         fine_tuned = StereoPredictor(run, device, "regressor_f", max_disparity)
     return Predictors(
-        initial=StereoPredictor(run, device, max_disparity=max_disparity),
+        initial=open_regressor(run, device, max_disparity),
         fine_tuned=fine_tuned,
         forest=load_forest(forest_file(run)) if forest_file(run).exists() else None,
     )
 
 
-PREDICTING: Mapping[PredictorName, tuple[str, ...]] = {
-    "networks": ("regressor", "confnet", "gradnet", "regressor_f"),
-    "sgbm": ("confnet_free", "gradnet_free"),
-}
-"""The networks that fill the fields of `EvaluationFrame` that methods look at."""
+def open_regressor(
+    run: Path, device: str = "cpu", max_disparity: int | None = None
+) -> StereoPredictor | JudgedRegressor:
+    """The regressor of a run folder with its heads or, where it has none, with the regressor-free networks."""
+    regressor = StereoPredictor(run, device, max_disparity=max_disparity)
+    if judged_by(run) == HEADS:
+        return regressor
+    return JudgedRegressor(RegressorFreePredictor(run, device), regressor)
+
+
+HEADS = ("confnet", "gradnet")
+"""The networks that judge the disparity of the regressor they were trained on."""
+FREE_HEADS = ("confnet_free", "gradnet_free")
+"""The networks that judge the disparity of any predictor."""
+
+
+def judged_by(run: Path) -> tuple[str, str]:
+    """The networks that judge the regressor's disparity in a run folder: heads of its own, unless there are none and
+    both regressor-free networks are there."""
+    own = any(has_weights(run, task) for task in HEADS)
+    return FREE_HEADS if not own and all(has_weights(run, task) for task in FREE_HEADS) else HEADS
+
+
+def predicting(run: Path, predictor: PredictorName = "networks") -> tuple[str, ...]:
+    """The networks that fill the fields of `EvaluationFrame` that methods look at."""
+    return FREE_HEADS if predictor == "sgbm" else ("regressor", *judged_by(run), "regressor_f")
 
 
 def network_digests(run: Path, predictor: PredictorName = "networks") -> dict[str, str]:
     """SHA-256 of the weights of each network that predicts, of those a run folder has."""
     return {
         task: hashlib.sha256(weights_path(run, task).read_bytes()).hexdigest()
-        for task in PREDICTING[predictor]
+        for task in predicting(run, predictor)
         if has_weights(run, task)
     }
 
@@ -207,7 +248,7 @@ def untrained(methods: Sequence[Method], run: Path, predictor: PredictorName) ->
     """
     networks = {"fine_tuned": "regressor_f"}
     if predictor == "networks":
-        networks |= {"confidence": "confnet", "gradient": "gradnet"}
+        networks |= dict(zip(("confidence", "gradient"), judged_by(run), strict=True))
     lacking = {
         method.name: [
             network
@@ -263,8 +304,8 @@ def predict_pair(
         matching = open_matching(run, device, max_disparity)
         answer = matching.predict(left, right) if given is None else matching.predict_for(left, right, *given)
         return answer, fallback_notes(run)
-    answer = StereoPredictor(run, device, max_disparity=max_disparity).predict(left, right)
-    for name, found in (("confnet", answer.confidence), ("gradnet", answer.gradient)):
+    answer = open_regressor(run, device, max_disparity).predict(left, right)
+    for name, found in zip(HEADS, (answer.confidence, answer.gradient), strict=True):
         if found is None:
             raise CommandError(
                 f"{run}: has no {name}, which refining needs: {train_command(name, run)} makes one"

@@ -32,6 +32,7 @@ def preset_of(network: str, crops: int) -> RegressorPreset:
         validation_interval=VALIDATION_INTERVAL,
         network=NARROW[network],
         fixed_statistics=1.0,
+        optimizer=replace(full.optimizer, epsilon=1e-4),
     )
 
 

@@ -536,7 +536,7 @@ def test_wrong_requests_are_sentences(data: Path, run: Path, tmp_path: Path) -> 
     with pytest.raises(TrainingError, match="no device 'abacus'; it is called auto"):
         train_quietly("regressor", source, tmp_path / "device", quick_regressor(), device="abacus")
     with pytest.raises(
-        TrainingError, match=r"frames of 128x64 are smaller than the 320x128 .* \(--crop 128x64\)"
+        TrainingError, match=r"frames of 128x64 are smaller than the 320x160 .* \(--crop 128x64\)"
     ):
         train_quietly("regressor", source, tmp_path / "crop", "tiny")
     # What is said first of a request with two faults: the one that --crop does not cure.

@@ -55,7 +55,7 @@ class GivenTask(JointTask):
 
     def inputs(self, batch: GivenBatch) -> HeadInputs:  # type: ignore[override]
         seen = batch.left, batch.features
-        regression = Regression(batch.initial, batch.features, batch.features)
+        regression = Regression(batch.initial, {"joined": batch.features})
         return HeadInputs(regression, (*seen, batch.consistency), seen)
 
 
