@@ -33,4 +33,8 @@ def sample_scene(
         raise InputError(f"{family} takes a {kind.config.__name__}, not a {type(config).__name__}")
     assets = AssetPool() if assets is None else assets
     scene = kind.sample(rng, config.with_assets(assets))
+    if config.rig and scene.camera != config.rig.camera(scene.camera.motion):
+        raise InputError(
+            f"{family} takes no rig of one's own: it makes its camera without FamilyConfig.camera"
+        )
     return with_user_assets(rng, scene, assets, kind.replaceable) if kind.replaceable else scene

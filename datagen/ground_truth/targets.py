@@ -71,8 +71,9 @@ class PixelSurfaces:
         there = self.rays @ turn.T
         there[self.is_hit] = self._points_at(time)
         with np.errstate(divide="ignore", invalid="ignore"):
-            x, y = (camera.focal_px * there[:, :2] / -there[:, 2:]).T
-        seen = np.stack([camera.width / 2 + x, camera.height / 2 - y], -1)
+            x, y = (there[:, :2] / -there[:, 2:]).T
+        center_x, center_y = camera.principal_point(self.view)
+        seen = np.stack([center_x + camera.focal_px * x, center_y - camera.focal_y_px * y], -1)
         seen[there[:, 2] >= 0] = np.nan
         return (seen - self.centres).reshape(*self.shape, 2).astype(np.float32)
 
@@ -123,7 +124,7 @@ def find_surfaces(
         corners=caster.geometry.triangles[points.triangle[is_hit]],
         weights=points.weights[is_hit],
         centres=np.stack([columns, rows], -1) + 0.5,
-        rays=caster.directions(rows, columns),
+        rays=caster.directions(view, rows, columns),
     )
 
 

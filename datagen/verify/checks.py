@@ -38,14 +38,15 @@ MIN_COUNTED = 50
 """Shares of fewer pixels than this are not judged."""
 
 
-def check_disparity(disparity: NDArray[np.float32]) -> Iterator[str]:
-    """A disparity (H, W) is finite and not negative: a rendered world has no pixel without ground truth."""
+def check_disparity(disparity: NDArray[np.float32], at_infinity: float) -> Iterator[str]:
+    """A disparity (H, W) is finite and no less than at infinity: a rendered world has no pixel without ground truth."""
     wrong = int((~np.isfinite(disparity)).sum())
     if wrong:
         yield f"{wrong} disparities are not finite"
-    negative = int((disparity < 0).sum())
-    if negative:
-        yield f"{negative} disparities are negative, the least {np.nanmin(disparity):.3f} px"
+    less = int((disparity < np.float32(at_infinity)).sum())
+    if less:
+        beyond = "negative" if at_infinity == 0 else f"below {at_infinity:.3f} px, that of infinity"
+        yield f"{less} disparities are {beyond}, the least {np.nanmin(disparity):.3f} px"
 
 
 def check_gradient(
@@ -68,12 +69,12 @@ def check_gradient(
 
 
 def check_object_index(
-    index: NDArray[np.uint16], disparity: NDArray[np.float32], objects: int
+    index: NDArray[np.uint16], disparity: NDArray[np.float32], objects: int, at_infinity: float
 ) -> Iterator[str]:
     """Object indices (H, W) name objects that exist, and exactly the sky (index 0) is infinitely far."""
     if index.max() > objects:
         yield f"object index {index.max()} is beyond the scene's {objects} objects"
-    wrong = int(((index == 0) != (disparity == 0)).sum())
+    wrong = int(((index == 0) != (disparity == np.float32(at_infinity))).sum())
     if wrong:
         yield f"{wrong} pixels are sky in one of object index and disparity but not in the other"
 

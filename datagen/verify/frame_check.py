@@ -66,7 +66,9 @@ class FrameCheck:
         unusable = [
             (self._file("disparity", view), message)
             for view in VIEWS
-            for message in check_disparity(sample.view(view).disparity)
+            for message in check_disparity(
+                sample.view(view).disparity, self.scene.camera.disparity_at_infinity
+            )
         ]
         if unusable:  # Other problems would only follow from this one.
             yield from unusable
@@ -89,7 +91,10 @@ class FrameCheck:
         arrays, other = sample.view(view), sample.view("right" if view == "left" else "left")
         threshold_px = self.recipe.gradient_threshold_px
         yield from check_gradient(arrays.disparity, arrays.gradient, arrays.gradient_valid, threshold_px)
-        yield from check_object_index(arrays.object_index, arrays.disparity, len(self.scene.objects))
+        at_infinity = self.scene.camera.disparity_at_infinity
+        yield from check_object_index(
+            arrays.object_index, arrays.disparity, len(self.scene.objects), at_infinity
+        )
         yield from check_views(view, arrays.disparity, other.disparity, arrays.occlusion)
         if self.caster is None:
             return

@@ -32,7 +32,6 @@ from scenes.spec import (
     Scene,
     SceneObject,
     Shape,
-    StereoCamera,
     SunLight,
     Texture,
     Trajectory,
@@ -208,7 +207,7 @@ def _sample_rig(rng: np.random.Generator, config: FlyingThingsConfig) -> _Rig:
     pitch, roll = uniform(rng, *config.pitch_deg), uniform(rng, *config.roll_deg)
     # At a pitch of -90 degrees a camera looks straight down at -z; raised by 90 it looks along +y.
     attitude = Rotation.from_euler("XZ", (90.0 - pitch, roll), degrees=True)
-    still = StereoCamera(config.width, config.height, focal_mm, baseline_m, Trajectory.static())
+    still = config.camera(focal_mm, baseline_m, Trajectory.static())
     nearest_m = still.disparity_metres / (config.disparity_share[1] * config.width)
     motion = wander(
         rng,
@@ -220,8 +219,7 @@ def _sample_rig(rng: np.random.Generator, config: FlyingThingsConfig) -> _Rig:
         reach_m=0.25 * nearest_m,
         reach_deg=4.0,
     )
-    camera = StereoCamera(config.width, config.height, focal_mm, baseline_m, motion)
-    return _Rig(camera, config.frames, config)
+    return _Rig(replace(still, motion=motion), config.frames, config)
 
 
 def _final(rng: np.random.Generator, rig: _Rig) -> FinalPass:

@@ -27,7 +27,7 @@ from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, Scene
 from scenes.motion.trajectories import quaternion
 from scenes.shapes.solids.basic import Plane
-from scenes.spec import Deformation, Material, SceneObject, StereoCamera, Trajectory
+from scenes.spec import Deformation, Material, Rig, SceneObject, Trajectory
 from scenes.textures.plain import SolidColor
 from tests.datagen.worlds import plates
 
@@ -81,12 +81,21 @@ PLANE_HALF_M = 3.0
 KINDS = {"rigid": np.zeros((3, 3)), "deforming": np.array(STRETCH)}
 
 
-def moving_plane(stretch: NDArray[np.float64]) -> Scene:
+CENTRED = Rig(WIDTH, HEIGHT, FOCAL_PX, FOCAL_PX, WIDTH / 2, WIDTH / 2, HEIGHT / 2, BASELINE_M)
+RIGS = {
+    "centred": CENTRED,
+    "somebody's": Rig(
+        WIDTH, HEIGHT, 1.1 * FOCAL_PX, 0.9 * FOCAL_PX, 0.46 * WIDTH, 0.55 * WIDTH, 0.57 * HEIGHT, BASELINE_M
+    ),
+}
+
+
+def moving_plane(stretch: NDArray[np.float64], rig: Rig = CENTRED) -> Scene:
     deformation = Stretch(tuple(map(tuple, stretch))) if stretch.any() else None
     thing = SceneObject(
         "plane", Plane(), 0, PLANE.trajectory(), (PLANE_HALF_M, PLANE_HALF_M, 1.0), deformation
     )
-    camera = StereoCamera(WIDTH, HEIGHT, 32.0, BASELINE_M, RIG.trajectory())
+    camera = rig.camera(RIG.trajectory())
     scene = plates(WIDTH, HEIGHT)
     return replace(
         scene, frames=3, camera=camera, objects=(thing,), materials=(Material(SolidColor((90, 90, 90))),)
@@ -101,12 +110,13 @@ class Expected:
     normal: NDArray[np.float64]
 
 
-def closed_form(stretch: NDArray[np.float64], view: View, step: float, centre: float = 0.5) -> Expected:
+def closed_form(
+    stretch: NDArray[np.float64], view: View, step: float, centre: float = 0.5, rig: Rig = CENTRED
+) -> Expected:
     """Where the plane's points and the sky go from frame `NOW` on, from the motions' own formulas."""
     columns, rows = np.meshgrid(np.arange(WIDTH) + centre, np.arange(HEIGHT) + centre)
-    rays = np.stack(
-        [(columns - WIDTH / 2) / FOCAL_PX, (HEIGHT / 2 - rows) / FOCAL_PX, -np.ones_like(rows)], -1
-    )
+    cx = rig.cx_left if view == "left" else rig.cx_right
+    rays = np.stack([(columns - cx) / rig.fx, (rig.cy - rows) / rig.fy, -np.ones_like(rows)], -1)
     spans, middle = plane_seen(stretch, view, NOW)
     # The ray meets middle + u spans_x + v spans_y: three linear equations in (depth, u, v).
     system = np.concatenate([rays[..., None], np.broadcast_to(-spans, (*rays.shape[:2], 3, 2))], -1)
@@ -118,9 +128,9 @@ def closed_form(stretch: NDArray[np.float64], view: View, step: float, centre: f
     there = middle_then + np.stack([u, v], -1) @ spans_then.T
     camera_now, camera_then = RIG.at(NOW)[0], RIG.at(NOW + step)[0]
     there = np.where(hit[..., None], there, rays @ camera_now.T @ camera_then)
-    x = WIDTH / 2 + FOCAL_PX * there[..., 0] / -there[..., 2]
-    y = HEIGHT / 2 - FOCAL_PX * there[..., 1] / -there[..., 2]
-    change = np.where(hit, FOCAL_PX * BASELINE_M * (1 / -there[..., 2] - 1 / depth), 0.0)
+    x = cx + rig.fx * there[..., 0] / -there[..., 2]
+    y = rig.cy - rig.fy * there[..., 1] / -there[..., 2]
+    change = np.where(hit, rig.fx * BASELINE_M * (1 / -there[..., 2] - 1 / depth), 0.0)
     normal = np.cross(spans[:, 0], spans[:, 1])
     normal *= -np.sign(normal @ middle) / np.linalg.norm(normal)
     return Expected(hit, np.stack([x - columns, y - rows], -1), change, normal)
@@ -146,11 +156,13 @@ def surfaces(scene: Scene, view: View, time: float = NOW) -> PixelSurfaces:
 @pytest.mark.parametrize("direction", DIRECTIONS)
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("lens", RIGS)
 def test_flow_disparity_change_and_normals_have_their_closed_form(
-    kind: str, view: View, direction: Direction
+    kind: str, view: View, direction: Direction, lens: str
 ) -> None:
-    stretch = KINDS[kind]
-    found, expected = surfaces(moving_plane(stretch), view), closed_form(stretch, view, STEP[direction])
+    stretch, rig = KINDS[kind], RIGS[lens]
+    found = surfaces(moving_plane(stretch, rig), view)
+    expected = closed_form(stretch, view, STEP[direction], rig=rig)
     assert 0.3 < expected.hit.mean() < 0.95
     # Pixels on the plane's rim may fall to either side.
     rim = np.zeros_like(expected.hit)
@@ -168,11 +180,11 @@ def test_flow_disparity_change_and_normals_have_their_closed_form(
     # What would be wrong: half a pixel, the sign, the direction, the other view, a forgotten deformation.
     other_view: View = "right" if view == "left" else "left"
     wrong = {
-        "half a pixel": closed_form(stretch, view, STEP[direction], centre=0.0).flow,
+        "half a pixel": closed_form(stretch, view, STEP[direction], 0.0, rig).flow,
         "sign": -expected.flow,
-        "direction": closed_form(stretch, view, -STEP[direction]).flow,
-        "view": closed_form(stretch, other_view, STEP[direction]).flow,
-        "shape": closed_form(0.5 * stretch + 0.01, view, STEP[direction]).flow,
+        "direction": closed_form(stretch, view, -STEP[direction], rig=rig).flow,
+        "view": closed_form(stretch, other_view, STEP[direction], rig=rig).flow,
+        "shape": closed_form(0.5 * stretch + 0.01, view, STEP[direction], rig=rig).flow,
     }
     for name, other in wrong.items():
         assert np.percentile(np.linalg.norm(flow - other, axis=-1)[~rim], 50) > TOLERANCE_PX, name
