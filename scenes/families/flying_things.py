@@ -62,10 +62,10 @@ class FlyingThingsConfig(FamilyConfig):
     """Static objects on the ground per scene."""
     background_materials: Count = (8, 16)
     """Different materials the background objects of a scene share; every flying object has its own."""
-    focal_mm: Range = (35.0, 35.0)
-    """Focal length on a sensor 32 mm wide."""
-    baseline_m: Range = (1.0, 1.0)
-    """Distance between the cameras."""
+    focal_mm: Range = (18.0, 60.0)
+    """Focal length on a sensor 32 mm wide (35 as published)."""
+    baseline_m: Range = (0.05, 1.0)
+    """Distance between the cameras (1 as published); everything scales with it."""
     disparity_share: Range = (0.002, 0.167)
     """Disparity of the farthest and the nearest surface, as a share of the image width: 2 to 160 px at 960."""
     background_disparity_share: Range = (0.005, 0.04)

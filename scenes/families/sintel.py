@@ -67,9 +67,9 @@ class SintelConfig(LandscapeConfig):
 
     crowd = ("people", "trees", "structures", "boulders", "plants")
 
-    focal_mm: Range = (26.0, 60.0)
+    focal_mm: Range = (20.0, 60.0)
     """Focal length on a sensor 32 mm wide."""
-    focus_disparity_share: Range = (0.01, 0.036)
+    focus_disparity_share: Range = (0.01, 0.05)
     """Disparity of the main person, as a share of the image width (0.01 is 10 px at 960);
     it sets the baseline."""
     focus_height_share: Range = (0.35, 0.8)

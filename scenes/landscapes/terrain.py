@@ -25,9 +25,9 @@ NEAREST_SHARE = 0.105
 class LandscapeConfig(FamilyConfig):
     """Settings that the landscape families share: a camera that looks at a character on open land."""
 
-    focal_mm: Range = (22.0, 45.0)
+    focal_mm: Range = (18.0, 60.0)
     """Focal length on a sensor 32 mm wide."""
-    focus_disparity_share: Range = (0.016, 0.045)
+    focus_disparity_share: Range = (0.014, 0.052)
     """Disparity of the main character, as a share of the image width (0.016 is 15 px at 960);
     it sets the baseline."""
     focus_height_share: Range = (0.45, 0.8)
