@@ -16,7 +16,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -253,6 +253,13 @@ class StereoCamera:
     def disparity_at_infinity(self) -> float:
         """The disparity in px of what is infinitely far: cx_left - cx_right, 0 if both are in the middle."""
         return self.center_left_px - self.center_right_px
+
+    def depth(self, disparity: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Depths in metres along the optical axis of disparities in px; infinite where they are those of infinity."""
+        with np.errstate(divide="ignore"):
+            return np.float64(self.disparity_metres) / (
+                disparity.astype(np.float64) - self.disparity_at_infinity
+            )
 
     def principal_point(self, view: str) -> tuple[float, float]:
         """(x, y) in px where the optical axis of the "left" or "right" view meets the image."""

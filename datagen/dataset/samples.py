@@ -17,6 +17,8 @@ from datagen.dataset.manifest import FileEntry, read_manifest
 from datagen.dataset.remote_cache import open_remote
 from datagen.errors import DatasetError
 from datagen.formats import (
+    read_cameras,
+    read_depth,
     read_flow,
     read_gradient,
     read_mask,
@@ -171,6 +173,10 @@ class StereoSample:
         """
         return self._extra("material_index", view, read_png, (), np.uint16)
 
+    def depth(self, view: View) -> NDArray[np.float32]:
+        """(H, W) metres along the optical axis, infinite for the sky."""
+        return self._extra("depth", view, read_depth, (), np.float32)
+
     def normals(self, view: View) -> NDArray[np.float32]:
         """(H, W, 3) unit normals in the camera's frame (x right, y up, z towards the camera), 0 for the sky."""
         return self._extra("normals", view, read_normals, (3,), np.float32)
@@ -186,6 +192,16 @@ class StereoSample:
     def motion_boundaries(self, view: View, direction: Direction) -> NDArray[np.bool_]:
         """(H, W) True where objects that move differently meet."""
         return self._extra("motion_boundaries", view, read_mask, (), np.bool_, direction)
+
+    @cached_property
+    def cameras(self) -> dict[str, dict[str, NDArray[np.float64]]]:
+        """Each view's `K` (3, 3), `world_to_camera` and `camera_to_world` (4, 4), in OpenCV's convention and metres."""
+        path = self.intact(self.layout.file("cameras", self.split, self.scene))
+        try:
+            views = read_cameras(path)["frames"][str(self.frame)]
+            return {view: {name: np.array(one) for name, one in views[view].items()} for view in VIEWS}
+        except (KeyError, TypeError, AttributeError) as error:
+            raise DatasetError(f"{path}: has no cameras of frame {self.frame}") from error
 
     @cached_property
     def scene_record(self) -> Scene:

@@ -44,7 +44,7 @@ _CANNOT_HOLD = {
         "poses",
         *EXTRA_TARGETS,
     ),
-    "sceneflow": ("disparity_gradient", "occlusion", "object_index", "normals", "material_index"),
+    "sceneflow": ("disparity_gradient", "occlusion", "object_index", "depth", "normals", "material_index"),
     "webdataset": (),
 }
 """What the layout of a format has no place for."""

@@ -111,5 +111,9 @@ def _meta(sample: StereoSample) -> dict[str, object]:
         "render_pass": sample.render_pass,
         "family": sample.scene_record.family,
         **rig_numbers(camera),
+        "cameras": {
+            view: {name: matrix.tolist() for name, matrix in numbers.items()}
+            for view, numbers in sample.cameras.items()
+        },
         "poses": {view: pose.tolist() for view, pose in zip(VIEWS, poses, strict=True)},
     }

@@ -172,16 +172,22 @@ class ExtraTargets:
         self._caster, self._kinds = caster, kinds
 
     def make(
-        self, view: View, frame: int, object_index: NDArray[np.integer[Any]]
+        self,
+        view: View,
+        frame: int,
+        object_index: NDArray[np.integer[Any]],
+        disparity: NDArray[np.float64],
     ) -> dict[tuple[str, Direction | None], NDArray[Any]]:
         """The arrays of one view and frame, by kind and direction of time.
 
-        frame: The instant, from 0. object_index: (H, W) of that view and frame.
+        frame: The instant, from 0. object_index, disparity: (H, W) of that view and frame.
         """
         made: dict[tuple[str, Direction | None], NDArray[Any]] = {}
         if "material_index" in self._kinds:
             made["material_index", None] = material_index(self._caster.geometry.scene, object_index)
-        if set(self._kinds) <= {"material_index"}:
+        if "depth" in self._kinds:
+            made["depth", None] = self._caster.geometry.scene.camera.depth(disparity).astype(np.float32)
+        if set(self._kinds) <= {"depth", "material_index"}:
             return made
         pixels = np.indices(object_index.shape)
         surfaces = find_surfaces(self._caster, view, frame, pixels[0], pixels[1])

@@ -19,6 +19,7 @@ from datagen.dataset.layout import View
 from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.ground_truth.labels import forward_differences, gradient_validity
 from datagen.ground_truth.raycast import Hits
+from scenes.spec import StereoCamera
 
 CONSISTENCY_TOLERANCE_PX = 0.25
 """How far a visible pixel's disparity may lie outside those of the two pixels it falls between."""
@@ -30,6 +31,8 @@ FRAME_TIE_PX = 1e-3
 """A point this close to the edge of the other view's frame may have either label."""
 GEOMETRY_TOLERANCE_PX = 1e-2
 """How far a sampled disparity may be from the scene's geometry."""
+DEPTH_TOLERANCE_PX = 1e-4
+"""How far the disparity of a stored depth may be from the stored disparity."""
 MAX_OFF_GEOMETRY = 0.01
 """Share of sampled pixels that may differ from the scene's geometry by more than the tolerance."""
 MAX_OFF_LABELS = 0.03
@@ -173,6 +176,19 @@ def check_vectors(
         MAX_OFF_GEOMETRY,
         f"sampled values are over {tolerance} from the scene's geometry",
     )
+
+
+def check_depth(
+    depth: NDArray[np.float32], disparity: NDArray[np.float32], camera: StereoCamera
+) -> Iterator[str]:
+    """A depth (H, W) in metres has the stored disparity (H, W), and the sky has none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        expected = camera.disparity_metres / depth.astype(np.float64) + camera.disparity_at_infinity
+        # Both are rounded to 32 bits.
+        same = np.abs(expected - disparity) <= DEPTH_TOLERANCE_PX + 1e-6 * np.abs(disparity)
+    wrong = int((~same | ~(depth > 0)).sum())
+    if wrong:
+        yield f"{wrong} depths are not those of the disparity"
 
 
 def check_derived(values: NDArray[Any], expected: NDArray[Any], origin: str) -> Iterator[str]:

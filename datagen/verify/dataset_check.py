@@ -8,7 +8,7 @@ from contextlib import closing, contextmanager
 from itertools import islice
 from pathlib import Path
 
-from datagen.dataset.layout import KINDS, SPLITS, Layout, SceneKey
+from datagen.dataset.layout import FOLDERS, SPLITS, Layout, SceneKey
 from datagen.dataset.remote_cache import RemoteLayout, open_remote
 from datagen.dataset.samples import open_layout
 from datagen.errors import MachineError
@@ -157,7 +157,7 @@ def _unfinished(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
 def _orphans(layout: Layout, known_by_scene: Iterable[set[str]]) -> Iterator[Problem]:
     """Files in the data set's folders that belong to no finished scene."""
     known = set().union(*known_by_scene)
-    for folder in (*KINDS, "scenes", "manifest"):
+    for folder in (*FOLDERS, "scenes", "manifest"):
         for name in layout.tree.files_below(folder):
             if name not in known:
                 yield Problem(name, "belongs to no finished scene")

@@ -22,6 +22,7 @@ from datagen.ground_truth.targets import (
 from datagen.recipe.recipe import Recipe
 from datagen.verify.checks import (
     check_boundaries,
+    check_depth,
     check_derived,
     check_disparity,
     check_geometry,
@@ -119,7 +120,7 @@ class FrameCheck:
         sample, kinds = self.samples[0], self.recipe.targets
         rows, columns = self._sampled(view)
         surfaces = None
-        if self.caster is not None and not set(kinds) <= {"material_index", "motion_boundaries"}:
+        if self.caster is not None and not set(kinds) <= {"depth", "material_index", "motion_boundaries"}:
             surfaces = find_surfaces(self.caster, view, sample.frame - FIRST_FRAME, rows, columns)
         if "material_index" in kinds:
             stored, index = sample.material_index(view), sample.view(view).object_index
@@ -127,6 +128,9 @@ class FrameCheck:
                 worn = material_index(self.scene, index)
                 for message in check_derived(stored, worn, "the objects' materials"):
                     yield self._file("material_index", view), message
+        if "depth" in kinds:
+            for message in check_depth(sample.depth(view), sample.view(view).disparity, self.scene.camera):
+                yield self._file("depth", view), message
         if "normals" in kinds:
             normals = sample.normals(view)[rows, columns]
             if surfaces is not None:

@@ -154,6 +154,10 @@ def test_webdataset_shards_stream_the_same_bytes(analytic_dataset: Path, tmp_pat
         assert meta["baseline_m"] == frame.scene_record.camera.baseline_m
         poses = read_camera_data(layout.file("camera_data", "train", frame.scene))[frame.frame]
         np.testing.assert_array_equal([meta["poses"][view] for view in ("left", "right")], poses)
+        assert meta["cx_left"] == (meta["width"] - 1) / 2
+        for view, pose in zip(("left", "right"), poses, strict=True):
+            opencv = np.array(meta["cameras"][view]["camera_to_world"])
+            np.testing.assert_allclose(opencv, pose @ np.diag((1, -1, -1, 1)), atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", EXPORTERS)

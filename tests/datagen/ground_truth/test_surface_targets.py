@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from datagen import DatasetError, Recipe, StereoDataset, StereoSample, render_dataset
 from datagen.dataset.layout import DIRECTIONS, EXTRA_TARGETS, VIEWS, Direction, Layout, View
 from datagen.dataset.manifest import file_entry, read_manifest, write_manifest
-from datagen.formats import write_flow, write_mask, write_normals, write_pfm, write_png
+from datagen.formats import write_depth, write_flow, write_mask, write_normals, write_pfm, write_png
 from datagen.gallery.page import write_gallery
 from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.scene_geometry import build_geometry
@@ -108,6 +108,7 @@ class Expected:
     flow: NDArray[np.float64]
     disparity_change: NDArray[np.float64]
     normal: NDArray[np.float64]
+    depth: NDArray[np.float64]
 
 
 def closed_form(
@@ -133,7 +134,7 @@ def closed_form(
     change = np.where(hit, rig.fx * BASELINE_M * (1 / -there[..., 2] - 1 / depth), 0.0)
     normal = np.cross(spans[:, 0], spans[:, 1])
     normal *= -np.sign(normal @ middle) / np.linalg.norm(normal)
-    return Expected(hit, np.stack([x - columns, y - rows], -1), change, normal)
+    return Expected(hit, np.stack([x - columns, y - rows], -1), change, normal, np.where(hit, depth, np.inf))
 
 
 def plane_seen(
@@ -177,6 +178,11 @@ def test_flow_disparity_change_and_normals_have_their_closed_form(
     assert np.abs(found.disparity_change(direction) - expected.disparity_change)[~rim].max() < TOLERANCE_PX
     normals = found.normals()[expected.hit & ~rim]
     assert np.abs(normals - expected.normal).max() < 1e-5
+    hits = SceneRayCaster(build_geometry(moving_plane(stretch, rig))).cast_all(view, NOW)
+    made = ExtraTargets(SceneRayCaster(found.geometry), ("depth",)).make(
+        view, 0, hits.object_index, hits.disparity
+    )
+    np.testing.assert_allclose(made["depth", None][~rim], expected.depth[~rim], rtol=1e-5)
     # What would be wrong: half a pixel, the sign, the direction, the other view, a forgotten deformation.
     other_view: View = "right" if view == "left" else "left"
     wrong = {
@@ -202,8 +208,8 @@ def test_only_what_was_asked_for_is_made(kinds: tuple[str, ...], monkeypatch: py
 
     monkeypatch.setattr(PixelSurfaces, "flow", counted)
     caster = SceneRayCaster(build_geometry(moving_plane(KINDS["rigid"])))
-    index = caster.cast_all("left", NOW).object_index
-    made = ExtraTargets(caster, kinds).make("left", NOW, index)
+    hits = caster.cast_all("left", NOW)
+    made = ExtraTargets(caster, kinds).make("left", NOW, hits.object_index, hits.disparity)
     assert {kind for kind, _ in made} == set(kinds)
     assert followed == (list(DIRECTIONS) if {"optical_flow", "motion_boundaries"} & set(kinds) else [])
 
@@ -333,6 +339,8 @@ def test_verify_finds_targets_that_are_not_of_the_scene(dataset: Path, tmp_path:
     mistakes: list[tuple[str, Direction | None, Callable[[Path, Any], None], Any]] = [
         ("material_index", None, write_png, sample.material_index("right")),
         ("normals", None, write_normals, turned),
+        ("depth", None, write_depth, sample.depth("left") * np.float32(1.001)),
+        ("depth", None, write_depth, np.minimum(sample.depth("left"), np.float32(1e4))),
         ("optical_flow", "into_future", write_flow, sample.flow("left", "into_future") + np.float32(0.5)),
         ("optical_flow", "into_past", write_flow, -sample.flow("left", "into_past")),
         ("disparity_change", "into_future", write_pfm, sample.disparity_change("left", "into_past")),
@@ -392,7 +400,7 @@ def test_targets_are_read_and_what_follows_from_others_compared_without_rays_too
 ) -> None:
     root = Path(shutil.copytree(dataset, tmp_path / "set"))
     layout, sample = Layout(root), StereoDataset(root, "train")[0]
-    direction: Direction | None = None if kind in ("material_index", "normals") else "into_past"
+    direction: Direction | None = None if kind in ("depth", "material_index", "normals") else "into_past"
     path = layout.file(kind, "train", 0, "left", sample.frame, direction)
     if kind == "material_index":
         write_png(path, sample.material_index("left") + np.uint16(1))
@@ -431,7 +439,7 @@ def test_flow_loaders_find_the_published_names(dataset: Path) -> None:
 
 def test_unknown_targets_are_refused() -> None:
     world = FAMILIES["flying_things"].config()
-    with pytest.raises(DatasetError, match=r"targets must be among material_index.*'albedo'"):
+    with pytest.raises(DatasetError, match=r"targets must be among depth, material_index.*'albedo'"):
         Recipe(world, {"train": 1}, targets=("albedo",))
 
 
