@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -33,7 +34,7 @@ from datagen.formats.png import read_png_size
 from scenes import Scene, scene_from_json
 from scenes.user_assets.pool import use_store
 from stereoforge_kit.errors import InputError
-from stereoforge_kit.files import LocalTree, open_tree
+from stereoforge_kit.files import LocalTree, open_tree, temporary_folder
 
 
 @dataclass(frozen=True)
@@ -385,6 +386,17 @@ def open_layout(root: Path | str) -> Layout:
     if not layout.recipe.is_file():
         raise DatasetError(f"{layout.root}: is not a data set, it has no {layout.recipe.name}")
     return layout
+
+
+@contextmanager
+def opened_layout(root: Path | str) -> Iterator[Layout]:
+    """The layout of a folder, or that of a URL with a cache that is removed afterwards. Raises DatasetError."""
+    tree = open_tree(root)
+    if isinstance(tree, LocalTree):
+        yield open_layout(root)
+        return
+    with temporary_folder() as folder:
+        yield open_remote(tree, folder)
 
 
 def read_scene(path: Path) -> Scene:

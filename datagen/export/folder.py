@@ -23,7 +23,16 @@ RECORD = "export.json"
 """The name of the record in the export's folder."""
 STAGING = ".export"
 _OURS = re.compile(
-    "|".join(["training", "validation", "testing", r"(train|val|test)-\d{6,}\.tar", re.escape(INDEX_NAME)])
+    "|".join(
+        [
+            "training",
+            "validation",
+            "testing",
+            "annotations",
+            r"(train|val|test)-\d{6,}\.tar",
+            re.escape(INDEX_NAME),
+        ]
+    )
     + rf"|recipe\.yaml|{'|'.join(FOLDERS)}"
 )
 """What exports have at the top of their folder. Whatever else is there is somebody else's and stays."""
