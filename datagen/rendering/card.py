@@ -159,9 +159,9 @@ def _contents(recipe: Recipe, scenes: dict[str, list[int]]) -> str:
     table = "\n".join(lines)
     return (
         f"## What is in it\n\n{table}\n\n"
-        f"For every pair: {', '.join(kinds)}. No scene, mesh or texture is in two splits. Disparity is x_left - x_right "
-        "in pixels; occlusion is 0 visible, 255 occluded, 128 out of the other frame. `manifest/` has the SHA-256 of "
-        "every file, and `stereoforge verify` checks them.\n"
+        f"For every pair: {', '.join(kinds)}. No scene, mesh or texture is in two splits. Disparity is x_left - "
+        "x_right in pixels; occlusion is 0 visible, 255 occluded, 128 out of the other frame. `manifest/` has the "
+        "SHA-256 of every file, and `stereoforge verify` checks them.\n"
     )
 
 
