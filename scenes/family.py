@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self, get_type_hints
 
 import numpy as np
 
+from scenes.imperfections import ImperfectionRanges
 from scenes.random_draws import Count, Range
 from scenes.spec import OMIT_DEFAULT, Rig, Scene, StereoCamera, Trajectory
 from scenes.user_assets.pool import AssetPool
@@ -46,6 +47,8 @@ class FamilyConfig:
     """Frames per scene."""
     rig: Rig | None = field(default=None, metadata=OMIT_DEFAULT)
     """The stereo rig that all scenes are seen by; None to sample focal lengths and baselines."""
+    imperfections: ImperfectionRanges = field(default_factory=ImperfectionRanges)
+    """How the final pass's rigs differ from ideal ones."""
 
     def __post_init__(self) -> None:
         """The checks that all families share; a family adds its own after these."""

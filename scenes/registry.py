@@ -7,6 +7,7 @@ import numpy as np
 import scenes.families
 from scenes.discovery import modules_in
 from scenes.family import Family, FamilyConfig
+from scenes.imperfections import with_imperfections
 from scenes.spec import Scene
 from scenes.user_assets.pool import AssetPool
 from scenes.user_assets.replacement import with_user_assets
@@ -37,4 +38,6 @@ def sample_scene(
         raise InputError(
             f"{family} takes no rig of one's own: it makes its camera without FamilyConfig.camera"
         )
-    return with_user_assets(rng, scene, assets, kind.replaceable) if kind.replaceable else scene
+    if kind.replaceable:
+        scene = with_user_assets(rng, scene, assets, kind.replaceable)
+    return with_imperfections(rng, scene, config.imperfections)

@@ -369,6 +369,29 @@ class Fog:
 
 
 @dataclass(frozen=True)
+class Imperfections:
+    """How a real rig's pictures differ from the ideal rig's, whose ground truth stays.
+
+    The right view's own exposure and colour are in `FinalPass`.
+    """
+
+    lower_px: float = 0.0
+    """How far everything in the right view lies too low."""
+    rotation_deg: Vector = (0.0, 0.0, 0.0)
+    """The right camera's rotation about its x, y and z axis (right, down, forward), in this order."""
+    focal_ratio: float = 1.0
+    """The right camera's focal length relative to the one it should have."""
+    blur_px: tuple[float, float] = (0.0, 0.0)
+    """Standard deviation of the left and the right view's blur."""
+    noise: float = 0.0
+    """Standard deviation of photon noise at full white and a gain of 1, 0..1; beside `FinalPass.noise`."""
+    gain: tuple[float, float] = (1.0, 1.0)
+    """Gain of the left and the right sensor: exposed for less, amplified by as much."""
+    jpeg_quality: int = 0
+    """Both pictures have been JPEG files of this quality, 1..100; 0 for never."""
+
+
+@dataclass(frozen=True)
 class FinalPass:
     """What the final pass adds to the clean one. Ground truth is the same for both."""
 
@@ -388,6 +411,8 @@ class FinalPass:
     # The record's text seeds the sensor's noise, so another name in files would be another final pass.
     right_view_color: Color = field(default=(1.0, 1.0, 1.0), metadata={NAME_ON_DISK: "right_eye_color"})
     """The right view's colour balance relative to the left's: a gain for each RGB channel."""
+    imperfections: Imperfections = field(default_factory=Imperfections, metadata=OMIT_DEFAULT)
+    """Residual errors of the rig, and differences between its cameras."""
 
 
 @dataclass(frozen=True)

@@ -132,8 +132,8 @@ def render_frames(
             if "final" in options.passes:
                 with watch.step("render_final"), quiet(log):
                     for view, radiance in render_final(world, frame, exposure, scratch).items():
-                        light = sensor.expose(radiance, exposure, view, frame)
-                        images[view]["final"] = develop(light, 1.0)
+                        light = sensor.expose(sensor.project(radiance, view), exposure, view, frame)
+                        images[view]["final"] = sensor.store(develop(light, 1.0))
             with watch.step("ground_truth"):
                 targets = {}
                 for view in VIEWS:
