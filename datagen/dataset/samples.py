@@ -95,12 +95,12 @@ class StereoSample:
 
     @cached_property
     def disparity_left(self) -> NDArray[np.float32]:
-        """(H, W) pixels, x_right = x_left - d; NaN invalid, 0 infinitely far."""
+        """(H, W) pixels, x_right = x_left - d; NaN invalid, 0 infinitely far unless the principal points differ."""
         return self._disparity("left")
 
     @cached_property
     def disparity_right(self) -> NDArray[np.float32]:
-        """(H, W) pixels, x_left = x_right + d; NaN invalid, 0 infinitely far."""
+        """(H, W) pixels, x_left = x_right + d; NaN invalid, 0 infinitely far unless the principal points differ."""
         return self._disparity("right")
 
     @property

@@ -69,15 +69,17 @@ def update_card(tree: Tree, area: StagingArea) -> None:
         if not present.startswith(MARK):
             return
         card = compose_card(tree)
-        if card.text == present:
-            continue
         if card.picture is not None:
-            staged = area.folder / PICTURE
-            write_png(staged, card.picture)
-            tree.adopt(staged, PICTURE)
-        staged = area.folder / CARD
-        staged.write_text(card.text, encoding="utf-8")
-        tree.adopt(staged, CARD)
+            write_png(area.folder / PICTURE, card.picture)
+            _adopt(tree, area.folder / PICTURE)
+        (area.folder / CARD).write_text(card.text, encoding="utf-8")
+        _adopt(tree, area.folder / CARD)
+
+
+def _adopt(tree: Tree, staged: Path) -> None:
+    """Put a file into the data set unless it is there already."""
+    if not tree.exists(staged.name) or tree.read(staged.name) != staged.read_bytes():
+        tree.adopt(staged, staged.name)
 
 
 def compose_card(tree: Tree) -> Card:

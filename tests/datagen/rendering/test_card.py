@@ -76,6 +76,15 @@ def test_shards_and_growth_give_the_same_card(whole: Path, tmp_path: Path) -> No
     assert verify_dataset(root).problems == ()
 
 
+def test_a_picture_that_was_lost_comes_back(tmp_path: Path) -> None:
+    root, recipe = tmp_path / "set", replace(SMALL, scenes={"train": 1})
+    render_dataset(recipe, root, executor=ONE_WORKER)
+    before = card_of(root)
+    (root / PICTURE).unlink()
+    render_dataset(recipe, root, executor=ONE_WORKER)
+    assert card_of(root) == before
+
+
 def test_verify_finds_a_card_that_says_something_else(tmp_path: Path) -> None:
     root = tmp_path / "set"
     render_dataset(replace(SMALL, scenes={"train": 1}), root, executor=ONE_WORKER)
