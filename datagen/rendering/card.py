@@ -7,7 +7,9 @@ a `LICENSES.md` beside it says is taken over.
 
 from __future__ import annotations
 
+import hashlib
 import inspect
+import json
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -99,7 +101,25 @@ def compose_card(tree: Tree) -> Card:
         _licenses(recipe, notes),
         _loading(recipe, next(split for split in SPLITS if scenes[split] or split == "test")),
     )
-    return Card(MARK + "\n" + "\n".join(sections), picture)
+    return Card(MARK + _stamp(recipe, scenes) + "\n" + "\n".join(sections), picture)
+
+
+def is_of_these_scenes(layout: Layout, recipe: Recipe) -> bool:
+    """Whether a data set's card, if it has one of ours, was written for the scenes that are finished now.
+
+    Its wording may be that of another version.
+    """
+    if not layout.tree.exists(CARD):
+        return True
+    present = layout.tree.read(CARD).decode("utf-8", "replace")
+    scenes = {split: layout.committed_scenes(split) for split in SPLITS}
+    return not present.startswith(MARK) or _stamp(recipe, scenes) in present
+
+
+def _stamp(recipe: Recipe, scenes: dict[str, list[int]]) -> str:
+    """A line that stands for the scenes that a card is of."""
+    said = json.dumps([recipe.settings_sha256(), scenes], sort_keys=True)
+    return f"<!-- Of the scenes {hashlib.sha256(said.encode()).hexdigest()[:16]}. -->\n"
 
 
 def _finished(tree: Tree) -> dict[str, list[str]]:

@@ -13,13 +13,13 @@ from datagen.dataset.remote_cache import RemoteLayout
 from datagen.dataset.samples import opened_layout
 from datagen.errors import MachineError
 from datagen.recipe.recipe import Recipe, read_recipe, recipe_to_text
-from datagen.rendering.card import CARD, MARK, compose_card
+from datagen.rendering.card import CARD, is_of_these_scenes
 from datagen.rendering.quarantine import quarantined_scenes
 from datagen.rendering.run import local_executor
 from datagen.verify.report import Problem, VerifyReport
 from datagen.verify.scene_check import SAMPLED_PIXELS, SceneCheck
 from datagen.verify.shard_check import has_shards, verify_shards
-from stereoforge_kit.files import Tree, open_tree
+from stereoforge_kit.files import open_tree
 
 FEW_SCENES = 8
 """Fewer scenes than this are checked in this process: others would take longer to start."""
@@ -75,7 +75,10 @@ def verify_dataset(
             problems += _recipe_problems(layout, recipe)
             problems += _unfinished(layout, recipe)
             problems += _orphans(layout, (result.known for result in results))
-            problems += () if problems else _card_problems(tree)
+            if not is_of_these_scenes(layout, recipe):
+                problems.append(
+                    Problem(CARD, "is the card of other scenes; stereoforge render writes it anew")
+                )
     return VerifyReport(
         root=layout.tree.name,
         scenes=len(results),
@@ -143,15 +146,6 @@ def _unfinished(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
                 f"{missing} of the recipe's {count} {split} scenes are not finished ({numbers}){quarantined}"
             )
             yield Problem(layout.recipe.name, message, split)
-
-
-def _card_problems(tree: Tree) -> Iterator[Problem]:
-    """A card that is ours says what the scenes are."""
-    present = tree.read(CARD).decode("utf-8", "replace") if tree.exists(CARD) else ""
-    if present.startswith(MARK) and present != compose_card(tree).text:
-        yield Problem(
-            CARD, "is not the card of these scenes; the same stereoforge render again writes it anew"
-        )
 
 
 def _orphans(layout: Layout, known_by_scene: Iterable[set[str]]) -> Iterator[Problem]:
