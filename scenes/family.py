@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Self, get_type_hints
 
 import numpy as np
 
+from scenes.imperfections import ImperfectionRanges
 from scenes.random_draws import Count, Range
-from scenes.spec import Scene
+from scenes.spec import OMIT_DEFAULT, Rig, Scene, StereoCamera, Trajectory
 from scenes.user_assets.pool import AssetPool
 from scenes.user_assets.replacement import Replaceable
 from stereoforge_kit.errors import InputError
@@ -44,6 +45,10 @@ class FamilyConfig:
     """Image height, pixels."""
     frames: int = 1
     """Frames per scene."""
+    rig: Rig | None = field(default=None, metadata=OMIT_DEFAULT)
+    """The stereo rig that all scenes are seen by; None to sample focal lengths and baselines."""
+    imperfections: ImperfectionRanges = field(default_factory=ImperfectionRanges)
+    """How the final pass's rigs differ from ideal ones."""
 
     def __post_init__(self) -> None:
         """The checks that all families share; a family adds its own after these."""
@@ -60,6 +65,20 @@ class FamilyConfig:
                 raise InputError(f"{name} must be in 0..1, got {given}")
         if self.frames < 1:
             raise InputError(f"frames must be at least 1, got {self.frames}")
+        if self.rig and (self.rig.width, self.rig.height) != (self.width, self.height):
+            raise InputError(
+                f"the rig's images are {self.rig.width}x{self.rig.height}, not {self.width}x{self.height}"
+            )
+
+    def lens_mm(self, focal_mm: float) -> float:
+        """The rig's focal length on a sensor 32 mm wide, or the one that was drawn if there is no rig."""
+        return self.rig.focal_mm if self.rig else focal_mm
+
+    def camera(self, focal_mm: float, baseline_m: float, motion: Trajectory) -> StereoCamera:
+        """The camera of a scene on a path: the rig, or one of the lens and baseline drawn if there is none."""
+        if self.rig:
+            return self.rig.camera(motion)
+        return StereoCamera(self.width, self.height, focal_mm, baseline_m, motion)
 
     def with_assets(self, assets: AssetPool) -> Self:  # noqa: ARG002
         """This config with the user's files, for a family that draws them while it samples.
@@ -100,7 +119,7 @@ def _numbers(config: type[FamilyConfig]) -> dict[str, Any]:
     """The types of the fields that hold numbers or tuples of them, by name."""
     kinds = (int, float, Range, Count, tuple[float, ...])
     hints = get_type_hints(config)
-    return {field.name: hints[field.name] for field in fields(config) if hints[field.name] in kinds}
+    return {one.name: hints[one.name] for one in fields(config) if hints[one.name] in kinds}
 
 
 def _scaled(limits: tuple[float, float], factor: float) -> tuple[float, float]:

@@ -7,6 +7,7 @@ import numpy as np
 import scenes.families
 from scenes.discovery import modules_in
 from scenes.family import Family, FamilyConfig
+from scenes.imperfections import with_imperfections
 from scenes.spec import Scene
 from scenes.user_assets.pool import AssetPool
 from scenes.user_assets.replacement import with_user_assets
@@ -33,4 +34,10 @@ def sample_scene(
         raise InputError(f"{family} takes a {kind.config.__name__}, not a {type(config).__name__}")
     assets = AssetPool() if assets is None else assets
     scene = kind.sample(rng, config.with_assets(assets))
-    return with_user_assets(rng, scene, assets, kind.replaceable) if kind.replaceable else scene
+    if config.rig and scene.camera != config.rig.camera(scene.camera.motion):
+        raise InputError(
+            f"{family} takes no rig of one's own: it makes its camera without FamilyConfig.camera"
+        )
+    if kind.replaceable:
+        scene = with_user_assets(rng, scene, assets, kind.replaceable)
+    return with_imperfections(rng, scene, config.imperfections)

@@ -28,9 +28,6 @@ from stereoforge_kit.errors import InputError
 
 T = TypeVar("T")
 
-OMIT_DEFAULT = {"omit_default": True}
-"""Metadata of a field that is written only where it differs from its default."""
-
 
 def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str = "kind") -> None:
     """Read and write any of `kinds` where the base class is asked for, its name under `tag`."""

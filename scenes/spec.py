@@ -16,7 +16,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,10 @@ Quaternion = tuple[float, float, float, float]
 
 NAME_ON_DISK = "name_on_disk"
 """Key in a field's metadata: what the field is called in files, where that is not its own name."""
+OMIT_DEFAULT = {"omit_default": True}
+"""Metadata of a field that is written only where it differs from its default."""
+SENSOR_WIDTH_MM = 32.0
+"""Width of the sensor that focal lengths in millimetres refer to."""
 
 IDENTITY_ROTATION: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
@@ -200,7 +204,10 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class StereoCamera:
-    """A rectified pair of pinhole cameras: square pixels, principal point in the middle, same focal length.
+    """A rectified pair of pinhole cameras: parallel axes, the same focal lengths, and the same row of the horizon.
+
+    Pixel centres are at + 0.5, so a principal point in the middle is (width / 2, height / 2). Both cameras' are there
+    and pixels are square, unless the fields after `sensor_width_mm` say otherwise.
 
     Raises ValueError for a size, focal length, baseline or sensor width that is not positive.
     """
@@ -208,25 +215,56 @@ class StereoCamera:
     width: int
     height: int
     focal_mm: float
+    """Along x."""
     baseline_m: float
     motion: Trajectory
     """Path of the left camera."""
-    sensor_width_mm: float = 32.0
+    sensor_width_mm: float = SENSOR_WIDTH_MM
+    focal_ratio: float = field(default=1.0, metadata=OMIT_DEFAULT)
+    """fy / fx."""
+    center_left_px: float = field(default=0.0, metadata=OMIT_DEFAULT)
+    """How far right of the middle the left view's principal point is."""
+    center_right_px: float = field(default=0.0, metadata=OMIT_DEFAULT)
+    """How far right of the middle the right view's principal point is."""
+    center_down_px: float = field(default=0.0, metadata=OMIT_DEFAULT)
+    """How far below the middle both principal points are."""
 
     def __post_init__(self) -> None:
-        for name in ("width", "height", "focal_mm", "baseline_m", "sensor_width_mm"):
+        for name in ("width", "height", "focal_mm", "baseline_m", "sensor_width_mm", "focal_ratio"):
             if not getattr(self, name) > 0:
                 raise InputError(f"a camera's {name} must be positive, got {getattr(self, name)}")
 
     @property
     def focal_px(self) -> float:
-        """Focal length in pixels, the same along x and y."""
+        """Focal length in pixels along x."""
         return self.focal_mm / self.sensor_width_mm * self.width
 
     @property
+    def focal_y_px(self) -> float:
+        """Focal length in pixels along y."""
+        return self.focal_px * self.focal_ratio
+
+    @property
     def disparity_metres(self) -> float:
-        """fx * B: disparity in pixels times depth in metres."""
+        """fx * B: what a pixel's disparity is above that of infinity, times its depth in metres."""
         return self.focal_px * self.baseline_m
+
+    @property
+    def disparity_at_infinity(self) -> float:
+        """The disparity in px of what is infinitely far: cx_left - cx_right, 0 if both are in the middle."""
+        return self.center_left_px - self.center_right_px
+
+    def depth(self, disparity: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Depths in metres along the optical axis of disparities in px; infinite where they are those of infinity."""
+        with np.errstate(divide="ignore"):
+            return np.float64(self.disparity_metres) / (
+                disparity.astype(np.float64) - self.disparity_at_infinity
+            )
+
+    def principal_point(self, view: str) -> tuple[float, float]:
+        """(x, y) in px where the optical axis of the "left" or "right" view meets the image."""
+        center_px = {"left": self.center_left_px, "right": self.center_right_px}[view]
+        return self.width / 2 + center_px, self.height / 2 + self.center_down_px
 
     def pose(self, view: str, time_frames: float) -> NDArray[np.float64]:
         """The (4, 4) camera-to-world matrix of the "left" or "right" view; ValueError for any other name."""
@@ -236,6 +274,52 @@ class StereoCamera:
         elif view != "left":
             raise InputError(f"a view is 'left' or 'right', not {view!r}")
         return pose
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rectified stereo rig as it was calibrated, in pixels whose centres are at + 0.5.
+
+    Raises ValueError for numbers that no rig has.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx_left: float
+    cx_right: float
+    cy: float
+    baseline_m: float
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height", "fx", "fy", "baseline_m"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise InputError(f"a rig's {name} must be positive, got {getattr(self, name)}")
+        for name, side in (("cx_left", self.width), ("cx_right", self.width), ("cy", self.height)):
+            if not abs(getattr(self, name) - side / 2) <= side:
+                raise InputError(
+                    f"a rig's {name} must be near its image, got {getattr(self, name)} of {side} px"
+                )
+
+    @property
+    def focal_mm(self) -> float:
+        """Focal length along x on a sensor `SENSOR_WIDTH_MM` wide."""
+        return self.fx / self.width * SENSOR_WIDTH_MM
+
+    def camera(self, motion: Trajectory) -> StereoCamera:
+        """The rig as a scene's camera on a path."""
+        return StereoCamera(
+            self.width,
+            self.height,
+            self.focal_mm,
+            self.baseline_m,
+            motion,
+            focal_ratio=self.fy / self.fx,
+            center_left_px=self.cx_left - self.width / 2,
+            center_right_px=self.cx_right - self.width / 2,
+            center_down_px=self.cy - self.height / 2,
+        )
 
 
 @dataclass(frozen=True)
@@ -285,6 +369,29 @@ class Fog:
 
 
 @dataclass(frozen=True)
+class Imperfections:
+    """How a real rig's pictures differ from the ideal rig's, whose ground truth stays.
+
+    The right view's own exposure and colour are in `FinalPass`.
+    """
+
+    lower_px: float = 0.0
+    """How far everything in the right view lies too low."""
+    rotation_deg: Vector = (0.0, 0.0, 0.0)
+    """The right camera's rotation about its x, y and z axis (right, down, forward), in this order."""
+    focal_ratio: float = 1.0
+    """The right camera's focal length relative to the one it should have."""
+    blur_px: tuple[float, float] = (0.0, 0.0)
+    """Standard deviation of the left and the right view's blur."""
+    noise: float = 0.0
+    """Standard deviation of photon noise at full white and a gain of 1, 0..1; beside `FinalPass.noise`."""
+    gain: tuple[float, float] = (1.0, 1.0)
+    """Gain of the left and the right sensor: exposed for less, amplified by as much."""
+    jpeg_quality: int = 0
+    """Both pictures have been JPEG files of this quality, 1..100; 0 for never."""
+
+
+@dataclass(frozen=True)
 class FinalPass:
     """What the final pass adds to the clean one. Ground truth is the same for both."""
 
@@ -304,6 +411,8 @@ class FinalPass:
     # The record's text seeds the sensor's noise, so another name in files would be another final pass.
     right_view_color: Color = field(default=(1.0, 1.0, 1.0), metadata={NAME_ON_DISK: "right_eye_color"})
     """The right view's colour balance relative to the left's: a gain for each RGB channel."""
+    imperfections: Imperfections = field(default_factory=Imperfections, metadata=OMIT_DEFAULT)
+    """Residual errors of the rig, and differences between its cameras."""
 
 
 @dataclass(frozen=True)

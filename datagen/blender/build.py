@@ -62,8 +62,15 @@ def place(world: BuiltWorld, view: str, time_frames: float) -> None:
         if thing.deformation is not None and world.deformed_at.get(index) != time_frames:
             world.deformed_at[index] = time_frames
             _move_vertices(block.data, world.geometry.local_vertices(index, time_frames))
-    pose = world.scene.camera.pose(view, time_frames)
+    camera = world.scene.camera
+    pose = camera.pose(view, time_frames)
     world.camera.matrix_world = Matrix(pose.tolist())
+    # Blender moves the image instead of the principal point, up and to the right, in widths of square pixels.
+    center_x, center_y = camera.principal_point(view)
+    set_exactly(world.camera.data, "shift_x", 0.5 - center_x / camera.width)
+    set_exactly(
+        world.camera.data, "shift_y", (center_y - camera.height / 2) / camera.focal_ratio / camera.width
+    )
     # Anything in front of the camera counts, however near or far.
     near, far = clip_planes(world.geometry, pose[:3, 3], time_frames)
     set_exactly(world.camera.data, "clip_start", near)
@@ -170,6 +177,10 @@ def _build_camera(camera: StereoCamera, blender_scene: bpy.types.Scene) -> bpy.t
     block.rotation_mode = "QUATERNION"
     blender_scene.collection.objects.link(block)
     blender_scene.camera = block
+    # A pixel is as wide as fy is long, and as high as fx; Blender takes no number below 1.
+    least = min(camera.focal_ratio, 1.0)
+    set_exactly(blender_scene.render, "pixel_aspect_x", camera.focal_ratio / least)
+    set_exactly(blender_scene.render, "pixel_aspect_y", 1.0 / least)
     set_exactly(blender_scene.render, "resolution_x", camera.width)
     set_exactly(blender_scene.render, "resolution_y", camera.height)
     return block

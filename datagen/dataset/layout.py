@@ -3,6 +3,7 @@
     recipe.yaml
     frames_cleanpass/TRAIN/A/0003/left/0006.png     one file for each view and frame
     camera_data/TRAIN/A/0003/camera_data.txt        one file for each scene
+    camera_data/TRAIN/A/0003/cameras.json           one file for each scene
     scenes/TRAIN/A/0003.json                        the Scene record
     manifest/TRAIN/A/0003.json                      written last: a scene exists if its manifest does
 
@@ -48,6 +49,13 @@ class Kind:
     """Whether there is a file for each view and frame. Otherwise there is one for each scene, named after the kind."""
     over_time: bool = False
     """Whether there is a file for each direction of time, view and frame."""
+    own_name: str | None = None
+    """The kind's name, if it shares another kind's folder."""
+
+    @property
+    def name(self) -> str:
+        """What the kind is called; that of its folder, unless that is another kind's."""
+        return self.own_name or self.folder
 
     @property
     def directions(self) -> tuple[Direction | None, ...]:
@@ -56,7 +64,7 @@ class Kind:
 
 
 KINDS = {
-    kind.folder: kind
+    kind.name: kind
     for kind in (
         Kind("frames_cleanpass", ".png"),
         Kind("frames_finalpass", ".png"),
@@ -65,17 +73,28 @@ KINDS = {
         Kind("occlusion", ".png"),
         Kind("object_index", ".png"),
         Kind("material_index", ".png"),
+        Kind("depth", ".exr"),
         Kind("normals", ".exr"),
         Kind("optical_flow", ".pfm", over_time=True),
         Kind("disparity_change", ".pfm", over_time=True),
         Kind("motion_boundaries", ".pgm", over_time=True),
         Kind("camera_data", ".txt", per_view=False),
+        Kind("camera_data", ".json", per_view=False, own_name="cameras"),
     )
 }
-"""Every kind of data file by its name, which is also the name of its folder."""
-TARGETS = ("disparity", "disparity_gradient", "occlusion", "object_index", "camera_data")
+"""Every kind of data file by its name."""
+FOLDERS = tuple(dict.fromkeys(kind.folder for kind in KINDS.values()))
+"""The top folders of all kinds."""
+TARGETS = ("disparity", "disparity_gradient", "occlusion", "object_index", "camera_data", "cameras")
 """The kinds that every scene has, whichever passes were rendered."""
-EXTRA_TARGETS = ("material_index", "normals", "optical_flow", "disparity_change", "motion_boundaries")
+EXTRA_TARGETS = (
+    "depth",
+    "material_index",
+    "normals",
+    "optical_flow",
+    "disparity_change",
+    "motion_boundaries",
+)
 """The kinds that a recipe may ask for besides."""
 RENDER_PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
 """The kind of picture file by the name of the render pass."""
@@ -118,7 +137,7 @@ class Layout:
         """
         entry, folder = KINDS[kind], self.scene_folder(kind, split, scene)
         if not entry.per_view:
-            return folder / f"{entry.folder}{entry.extension}"
+            return folder / f"{entry.name}{entry.extension}"
         if view not in VIEWS or frame is None or frame < FIRST_FRAME:
             raise InputError(
                 f"a file of {kind} needs a view, left or right, and a frame from {FIRST_FRAME} up, "
@@ -142,7 +161,7 @@ class Layout:
 
     def scene_paths(self, split: str, scene: int) -> list[Path]:
         """All paths that a scene consists of: its folders, then its record, its manifest last."""
-        folders = [self.scene_folder(kind, split, scene) for kind in KINDS]
+        folders = [self._group(folder, split) / _number(scene) for folder in FOLDERS]
         return [*folders, self.scene_record(split, scene), self.manifest(split, scene)]
 
     @property

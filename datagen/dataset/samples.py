@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +18,8 @@ from datagen.dataset.manifest import FileEntry, read_manifest
 from datagen.dataset.remote_cache import open_remote
 from datagen.errors import DatasetError
 from datagen.formats import (
+    read_cameras,
+    read_depth,
     read_flow,
     read_gradient,
     read_mask,
@@ -31,7 +34,7 @@ from datagen.formats.png import read_png_size
 from scenes import Scene, scene_from_json
 from scenes.user_assets.pool import use_store
 from stereoforge_kit.errors import InputError
-from stereoforge_kit.files import LocalTree, open_tree
+from stereoforge_kit.files import LocalTree, open_tree, temporary_folder
 
 
 @dataclass(frozen=True)
@@ -92,12 +95,12 @@ class StereoSample:
 
     @cached_property
     def disparity_left(self) -> NDArray[np.float32]:
-        """(H, W) pixels, x_right = x_left - d; NaN invalid, 0 infinitely far."""
+        """(H, W) pixels, x_right = x_left - d; NaN invalid, 0 infinitely far unless the principal points differ."""
         return self._disparity("left")
 
     @cached_property
     def disparity_right(self) -> NDArray[np.float32]:
-        """(H, W) pixels, x_left = x_right + d; NaN invalid, 0 infinitely far."""
+        """(H, W) pixels, x_left = x_right + d; NaN invalid, 0 infinitely far unless the principal points differ."""
         return self._disparity("right")
 
     @property
@@ -171,6 +174,10 @@ class StereoSample:
         """
         return self._extra("material_index", view, read_png, (), np.uint16)
 
+    def depth(self, view: View) -> NDArray[np.float32]:
+        """(H, W) metres along the optical axis, infinite for the sky."""
+        return self._extra("depth", view, read_depth, (), np.float32)
+
     def normals(self, view: View) -> NDArray[np.float32]:
         """(H, W, 3) unit normals in the camera's frame (x right, y up, z towards the camera), 0 for the sky."""
         return self._extra("normals", view, read_normals, (3,), np.float32)
@@ -186,6 +193,16 @@ class StereoSample:
     def motion_boundaries(self, view: View, direction: Direction) -> NDArray[np.bool_]:
         """(H, W) True where objects that move differently meet."""
         return self._extra("motion_boundaries", view, read_mask, (), np.bool_, direction)
+
+    @cached_property
+    def cameras(self) -> dict[str, dict[str, NDArray[np.float64]]]:
+        """Each view's `K` (3, 3), `world_to_camera` and `camera_to_world` (4, 4), in OpenCV's convention and metres."""
+        path = self.intact(self.layout.file("cameras", self.split, self.scene))
+        try:
+            views = read_cameras(path)["frames"][str(self.frame)]
+            return {view: {name: np.array(one) for name, one in views[view].items()} for view in VIEWS}
+        except (KeyError, TypeError, AttributeError) as error:
+            raise DatasetError(f"{path}: has no cameras of frame {self.frame}") from error
 
     @cached_property
     def scene_record(self) -> Scene:
@@ -369,6 +386,17 @@ def open_layout(root: Path | str) -> Layout:
     if not layout.recipe.is_file():
         raise DatasetError(f"{layout.root}: is not a data set, it has no {layout.recipe.name}")
     return layout
+
+
+@contextmanager
+def opened_layout(root: Path | str) -> Iterator[Layout]:
+    """The layout of a folder, or that of a URL with a cache that is removed afterwards. Raises DatasetError."""
+    tree = open_tree(root)
+    if isinstance(tree, LocalTree):
+        yield open_layout(root)
+        return
+    with temporary_folder() as folder:
+        yield open_remote(tree, folder)
 
 
 def read_scene(path: Path) -> Scene:

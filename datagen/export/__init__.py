@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from datagen.dataset.layout import EXTRA_TARGETS
 from datagen.dataset.samples import StereoDataset
+from datagen.export.coco import export_coco
+from datagen.export.depth import DepthFile, export_depth
 from datagen.export.kitti import export_kitti
 from datagen.export.sceneflow import export_sceneflow
 from datagen.export.webdataset import export_webdataset
@@ -20,6 +22,8 @@ class ExportOptions:
     """webdataset: number of samples in one tar file."""
     lidar_beams: int | None = None
     """kitti: keep only the disparities that a laser scanner with so many beams would measure; None for all."""
+    depth_as: DepthFile = "png"
+    """depth: 16-bit PNG files of millimetres, or npy files of float32 metres."""
 
 
 Progress = Callable[[int, int], None]
@@ -28,6 +32,8 @@ Exporter = Callable[[Sequence[StereoDataset], Tree, ExportOptions, Progress], li
 """Writes all frames of some splits of one data set into a folder or URL; may return sentences for the user."""
 
 EXPORTERS: dict[str, Exporter] = {
+    "coco": lambda sets, out, _, progress: export_coco(sets, out, progress),
+    "depth": lambda sets, out, options, progress: export_depth(sets, out, options.depth_as, progress),
     "kitti": lambda sets, out, options, progress: export_kitti(sets, out, options.lidar_beams, progress),
     "sceneflow": lambda sets, out, _, progress: export_sceneflow(sets, out, progress),
     "webdataset": lambda sets, out, options, progress: export_webdataset(
@@ -44,8 +50,11 @@ _CANNOT_HOLD = {
         "poses",
         *EXTRA_TARGETS,
     ),
-    "sceneflow": ("disparity_gradient", "occlusion", "object_index", "normals", "material_index"),
+    "sceneflow": ("disparity_gradient", "occlusion", "object_index", "depth", "normals", "material_index"),
     "webdataset": (),
+    # These are one thing made of a data set, not a layout for all of it.
+    "coco": (),
+    "depth": (),
 }
 """What the layout of a format has no place for."""
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from datagen.dataset.layout import KINDS
+from datagen.dataset.layout import FOLDERS
 from datagen.dataset.samples import StereoDataset
 from datagen.errors import DatasetError
 from datagen.recipe.recipe import read_recipe
@@ -23,8 +23,17 @@ RECORD = "export.json"
 """The name of the record in the export's folder."""
 STAGING = ".export"
 _OURS = re.compile(
-    "|".join(["training", "validation", "testing", r"(train|val|test)-\d{6,}\.tar", re.escape(INDEX_NAME)])
-    + rf"|recipe\.yaml|{'|'.join(KINDS)}"
+    "|".join(
+        [
+            "training",
+            "validation",
+            "testing",
+            "annotations",
+            r"(train|val|test)-\d{6,}\.tar",
+            re.escape(INDEX_NAME),
+        ]
+    )
+    + rf"|recipe\.yaml|{'|'.join(FOLDERS)}"
 )
 """What exports have at the top of their folder. Whatever else is there is somebody else's and stays."""
 

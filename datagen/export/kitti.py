@@ -20,7 +20,7 @@ from datagen.export.lidar import lidar_mask
 from datagen.formats import write_png
 from datagen.sources.kitti import FRAME_LIST, UNITS_PER_PX
 from scenes.shapes.street.vehicles import VEHICLE_PARTS
-from scenes.spec import Scene
+from scenes.spec import Scene, StereoCamera
 from scenes.streets.traffic import vehicle_of
 from stereoforge_kit.files import Tree
 
@@ -75,8 +75,8 @@ def share_too_large(disparity: NDArray[np.float32]) -> float:
 def encode_disparity(disparity: NDArray[np.float32], keep: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """(H, W) uint16 KITTI numbers of a disparity (H, W) in px.
 
-    They are 0 where the mask `keep` (H, W) is False and where the disparity is not finite, 0 (infinitely far) or too
-    large to store.
+    They are 0 where the mask `keep` (H, W) is False and where the disparity is not finite, not above 0 (infinitely far)
+    or too large to store.
     """
     scaled = np.rint(np.nan_to_num(disparity).astype(np.float64) * UNITS_PER_PX)
     storable = keep & (disparity > 0) & (scaled <= np.iinfo(np.uint16).max)
@@ -103,7 +103,7 @@ def _write_frame(out: Tree, folder: str, number: int, sample: StereoSample, lida
     camera = scene.camera
     measured = np.ones(sample.size, bool)
     if lidar_beams is not None:
-        measured = lidar_mask(*sample.size, camera.focal_px, lidar_beams)
+        measured = lidar_mask(camera, lidar_beams)
     images: dict[str, NDArray[np.uint8] | NDArray[np.uint16]] = {
         "image_2": sample.left,
         "image_3": sample.right,
@@ -114,16 +114,15 @@ def _write_frame(out: Tree, folder: str, number: int, sample: StereoSample, lida
     for kind, image in images.items():
         with out.writing(f"{folder}/{kind}/{number:06d}_10.png") as path:
             write_png(path, image)
-    text = _calibration(camera.focal_px, camera.width, camera.height, camera.baseline_m)
-    out.write(f"{folder}/calib_cam_to_cam/{number:06d}.txt", text.encode())
+    out.write(f"{folder}/calib_cam_to_cam/{number:06d}.txt", _calibration(camera).encode())
 
 
-def _calibration(focal_px: float, width: int, height: int, baseline_m: float) -> str:
+def _calibration(camera: StereoCamera) -> str:
     """The rectified projections. KITTI has pixel centres at whole numbers."""
-    center = ((width - 1) / 2, (height - 1) / 2)
-    lines = []
-    for camera, offset in (("02", 0.0), ("03", -focal_px * baseline_m)):
-        matrix = (focal_px, 0.0, center[0], offset, 0.0, focal_px, center[1], 0.0, 0.0, 0.0, 1.0, 0.0)
-        lines.append(f"S_rect_{camera}: {width:e} {height:e}\n")
-        lines.append(f"P_rect_{camera}: {' '.join(f'{value:.12e}' for value in matrix)}\n")
+    fx, fy, lines = camera.focal_px, camera.focal_y_px, []
+    for view, number, offset in (("left", "02", 0.0), ("right", "03", -camera.disparity_metres)):
+        x, y = (center - 0.5 for center in camera.principal_point(view))
+        matrix = (fx, 0.0, x, offset, 0.0, fy, y, 0.0, 0.0, 0.0, 1.0, 0.0)
+        lines.append(f"S_rect_{number}: {camera.width:e} {camera.height:e}\n")
+        lines.append(f"P_rect_{number}: {' '.join(f'{value:.12e}' for value in matrix)}\n")
     return "".join(lines)

@@ -16,6 +16,8 @@ from datagen.dataset.manifest import read_manifest
 from datagen.dataset.samples import StereoDataset
 from stereoforge_kit.files import Tree
 
+CAMERAS = "cameras.json"
+"""A file of ours in a folder that was published."""
 PUBLISHED_KINDS = (
     *RENDER_PASSES.values(),
     "disparity",
@@ -39,7 +41,8 @@ def export_sceneflow(sets: Sequence[StereoDataset], out: Tree, progress: Callabl
             samples = list(group)
             manifest = read_manifest(layout.local(layout.manifest(frames.split, scene)))
             for entry in manifest.files:
-                if Path(entry.path).parts[0] in PUBLISHED_KINDS:
+                path = Path(entry.path)
+                if path.parts[0] in PUBLISHED_KINDS and path.name != CAMERAS:
                     out.write(entry.path, samples[0].intact(layout.root / entry.path).read_bytes())
             done += len(samples)
             progress(done, total)

@@ -17,6 +17,7 @@ from datagen.dataset.manifest import FileEntry, file_entry, read_manifest, seal
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.errors import DatasetError
 from datagen.formats import read_camera_data
+from datagen.formats.cameras_json import rig_numbers
 from datagen.recipe.recipe import read_recipe, recipe_to_text
 from datagen.sources.webdataset import INDEX_NAME, META
 from stereoforge_kit.errors import InputError
@@ -109,9 +110,10 @@ def _meta(sample: StereoSample) -> dict[str, object]:
         "frame": sample.frame,
         "render_pass": sample.render_pass,
         "family": sample.scene_record.family,
-        "width": camera.width,
-        "height": camera.height,
-        "focal_px": camera.focal_px,
-        "baseline_m": camera.baseline_m,
+        **rig_numbers(camera),
+        "cameras": {
+            view: {name: matrix.tolist() for name, matrix in numbers.items()}
+            for view, numbers in sample.cameras.items()
+        },
         "poses": {view: pose.tolist() for view, pose in zip(VIEWS, poses, strict=True)},
     }

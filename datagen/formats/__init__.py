@@ -7,6 +7,8 @@ gives the same bytes for the same array.
 """
 
 from datagen.formats.camera_data import read_camera_data, write_camera_data
+from datagen.formats.cameras_json import cameras_record, read_cameras, write_cameras
+from datagen.formats.depth_exr import read_depth, write_depth
 from datagen.formats.flow import read_flow, write_flow
 from datagen.formats.gradient_exr import read_gradient, write_gradient
 from datagen.formats.normals_exr import read_normals, write_normals
@@ -16,7 +18,10 @@ from datagen.formats.pgm import read_mask, write_mask
 from datagen.formats.png import read_png, write_png
 
 __all__ = [
+    "cameras_record",
     "read_camera_data",
+    "read_cameras",
+    "read_depth",
     "read_flow",
     "read_gradient",
     "read_mask",
@@ -26,6 +31,8 @@ __all__ = [
     "read_pfm_disparity",
     "read_png",
     "write_camera_data",
+    "write_cameras",
+    "write_depth",
     "write_flow",
     "write_gradient",
     "write_mask",

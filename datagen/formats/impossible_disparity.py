@@ -42,13 +42,14 @@ class ImpossibleShare:
 
 
 def drop_impossible(
-    disparity: NDArray[np.floating[Any]], noise_px: float = GROUND_TRUTH_NOISE_PX
+    disparity: NDArray[np.floating[Any]], noise_px: float = GROUND_TRUTH_NOISE_PX, at_infinity: float = 0.0
 ) -> tuple[NDArray[np.float32], ImpossibleShare]:
-    """Turn disparities that cannot be into NaN: not finite, larger than the picture is wide, or negative beyond noise.
+    """Turn disparities that cannot be into NaN: not finite, larger than the picture is wide, or farther than infinity.
 
     Args:
         disparity: (H, W) px.
-        noise_px: Disparities down to -`noise_px` are those of points far away, and become 0.
+        noise_px: Disparities that are less by no more than this are those of points far away, and become `at_infinity`.
+        at_infinity: The disparity of what is infinitely far, 0 unless the views' principal points differ.
 
     Returns:
         (H, W) float32 px with NaN where there is none, and the share of impossible ones among the finite ones.
@@ -58,8 +59,10 @@ def drop_impossible(
     ([[3.5, nan, 0.0, nan]], 0.333)
     """
     finite = np.isfinite(disparity)
-    negative = finite & (disparity < -noise_px)
+    negative = finite & (disparity < at_infinity - noise_px)
     too_large = finite & (disparity > disparity.shape[1])
-    kept = np.where(finite & ~negative & ~too_large, np.maximum(disparity, 0), np.nan).astype(np.float32)
+    kept = np.where(
+        finite & ~negative & ~too_large, np.maximum(disparity, np.float32(at_infinity)), np.nan
+    ).astype(np.float32)
     count = max(int(finite.sum()), 1)
     return kept, ImpossibleShare(float(negative.sum()) / count, float(too_large.sum()) / count)

@@ -173,6 +173,9 @@ def _extra_pictures(sample: StereoSample, recipe: Recipe) -> list[tuple[str, Pic
         for name in recipe.passes
         if name != sample.render_pass
     ]
+    if "depth" in recipe.targets:
+        with np.errstate(divide="ignore"):
+            pictures.append(("Depth (inverse)", disparity_picture(1 / sample.depth("left")), 90))
     if "normals" in recipe.targets:
         pictures.append(("Surface normals", normals_picture(sample.normals("left")), 90))
     if "material_index" in recipe.targets:
@@ -245,7 +248,8 @@ def histograms(statistics: dict[str, SetStatistics], wanted: DisparityHistogram 
         One matplotlib figure for each quantity.
     """
     nearest = max(float(np.percentile(one.disparity, 99.9)) for one in statistics.values())
-    edges = np.linspace(0, max(nearest, 1.0), 61)
+    farthest = min(0.0, *(float(np.percentile(one.disparity, 0.1)) for one in statistics.values()))
+    edges = np.linspace(farthest, max(nearest, 1.0), 61)
     lines = {split: _shares(one.disparity, edges) for split, one in statistics.items()}
     if wanted:
         disparity = np.concatenate([one.disparity for one in statistics.values()])

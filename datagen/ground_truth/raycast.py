@@ -26,7 +26,7 @@ class Hits:
     """What the rays through the centres of N pixels hit first."""
 
     disparity: NDArray[np.float64]
-    """(N,) pixels; 0 where nothing is hit."""
+    """(N,) pixels; that of infinity (`StereoCamera.disparity_at_infinity`) where nothing is hit."""
     object_index: NDArray[np.int64]
     """(N,) 0 where nothing is hit, else 1 + index in `Scene.objects`."""
     occlusion: NDArray[np.uint8]
@@ -60,17 +60,18 @@ class SceneRayCaster:
 
         Embree finds the triangle with 32-bit floats. The distance to its plane is then computed with 64 bits.
         """
-        directions = self.directions(rows, columns)
-        disparity, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
-        labels = np.full(len(directions), VISIBLE, np.uint8)
+        directions, camera = self.directions(view, rows, columns), self._scene.camera
+        inverse_depth, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
         if len(self.geometry.triangles):
             self._place(time_frames)
             own, other = self._camera_centres(view)
-            disparity, index = self._first_hits(own, directions)
-            x_other = columns + 0.5 + (-disparity if view == "left" else disparity)
-            inside = (x_other >= 0) & (x_other <= self._scene.camera.width)
-            labels[~inside] = OUT_OF_FRAME
-            occluded = self._is_occluded(own, other, directions[inside], disparity[inside])
+            inverse_depth, index = self._first_hits(own, directions)
+        disparity = camera.disparity_metres * inverse_depth + camera.disparity_at_infinity
+        x_other = columns + 0.5 + (-disparity if view == "left" else disparity)
+        inside = (x_other >= 0) & (x_other <= camera.width)
+        labels = np.where(inside, VISIBLE, OUT_OF_FRAME).astype(np.uint8)
+        if len(self.geometry.triangles):
+            occluded = self._is_occluded(own, other, directions[inside], inverse_depth[inside])
             labels[inside] = np.where(occluded, OCCLUDED, VISIBLE)
         return Hits(disparity, index, labels)
 
@@ -94,7 +95,7 @@ class SceneRayCaster:
         self, view: View, time_frames: float, rows: NDArray[np.intp], columns: NDArray[np.intp]
     ) -> SurfacePoints:
         """The surface points that the pixels (rows, columns), both (N,), show at their centres."""
-        directions = self.directions(rows, columns)
+        directions = self.directions(view, rows, columns)
         triangle, weights = np.full(len(directions), -1, np.int64), np.zeros((len(directions), 3))
         if len(self.geometry.triangles):
             self._place(time_frames)
@@ -114,18 +115,21 @@ class SceneRayCaster:
         """(N,) True where a pixel of the left view shows the back of a triangle, whose corners run clockwise there."""
         points, directions = (
             self.surface_points("left", time_frames, rows, columns),
-            self.directions(rows, columns),
+            self.directions("left", rows, columns),
         )
         back = points.triangle >= 0
         a, b, c = np.moveaxis(self._vertices[self.geometry.triangles[points.triangle[back]]], 1, 0)
         back[back] = np.einsum("ij,ij->i", np.cross(b - a, c - a), directions[back]) > 0
         return back
 
-    def directions(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
+    def directions(
+        self, view: View, rows: NDArray[np.intp], columns: NDArray[np.intp]
+    ) -> NDArray[np.float64]:
         """(N, 3) directions through the pixels' centres in the camera's frame, of length 1 along the optical axis."""
         camera = self._scene.camera
-        x = (columns + 0.5 - camera.width / 2) / camera.focal_px
-        y = -(rows + 0.5 - camera.height / 2) / camera.focal_px
+        center_x, center_y = camera.principal_point(view)
+        x = (columns + 0.5 - center_x) / camera.focal_px
+        y = -(rows + 0.5 - center_y) / camera.focal_y_px
         return np.stack([x, y, np.full_like(x, -1.0)], axis=-1)
 
     def _camera_centres(self, view: View) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -140,43 +144,43 @@ class SceneRayCaster:
     def _first_hits(
         self, origin: NDArray[np.float64], directions: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """The disparity (N,) in px and the object index (N,) of the first hits."""
+        """1 / depth (N,) in 1/m, 0 where nothing is hit, and the object index (N,) of the first hits."""
         hit = self._nearest(origin, directions)
         met = hit >= 0
         # Far fewer triangles are visible than there are pixels: compute the plane of each once.
         seen = np.zeros(len(self.geometry.triangles), bool)
         seen[hit[met]] = True
         place = (np.cumsum(seen) - 1)[hit[met]]
-        planes = self._disparity_planes(np.flatnonzero(seen), origin)
-        disparity, index = np.zeros(len(hit)), np.zeros(len(hit), np.int64)
-        disparity[met] = np.einsum("ij,ij->i", planes[place], directions[met])
+        planes = self._inverse_depth_planes(np.flatnonzero(seen), origin)
+        inverse_depth, index = np.zeros(len(hit)), np.zeros(len(hit), np.int64)
+        inverse_depth[met] = np.einsum("ij,ij->i", planes[place], directions[met])
         index[met] = 1 + self.geometry.owners[hit[met]]
-        return disparity, index
+        return inverse_depth, index
 
-    def _disparity_planes(
+    def _inverse_depth_planes(
         self, triangles: NDArray[np.intp], origin: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(K, 3) a vector p for each triangle: a ray r of length 1 along the axis hits its plane at disparity p.r."""
+        """(K, 3) a vector p for each triangle: a ray r of length 1 along the axis hits its plane at 1 / depth = p.r."""
         corners = self._vertices[self.geometry.triangles[triangles]] - origin
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        # depth = n.v / n.r, and disparity = fB / depth.
+        # depth = n.v / n.r.
         distance = np.einsum("ij,ij->i", normals, corners[:, 0])
-        return self._scene.camera.disparity_metres * normals / distance[:, None]
+        planes: NDArray[np.float64] = normals / distance[:, None]
+        return planes
 
     def _is_occluded(
         self,
         own: NDArray[np.float64],
         other: NDArray[np.float64],
         directions: NDArray[np.float64],
-        disparity: NDArray[np.float64],
+        inverse_depth: NDArray[np.float64],
     ) -> NDArray[np.bool_]:
         """(N,) True where something stands between the other camera and the point.
 
         The sky is in the same direction from both cameras.
         """
-        sky = disparity == 0
-        depth = self._scene.camera.disparity_metres / np.where(sky, 1.0, disparity)
-        towards = directions * depth[:, None]
+        sky = inverse_depth == 0
+        towards = directions / np.where(sky, 1.0, inverse_depth)[:, None]
         towards[~sky] += own - other
         return self._run(other, towards, "OCCLUDED", np.where(sky, _FAR, 1 - SAME_SURFACE)) == 0
 

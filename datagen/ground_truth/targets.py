@@ -71,8 +71,9 @@ class PixelSurfaces:
         there = self.rays @ turn.T
         there[self.is_hit] = self._points_at(time)
         with np.errstate(divide="ignore", invalid="ignore"):
-            x, y = (camera.focal_px * there[:, :2] / -there[:, 2:]).T
-        seen = np.stack([camera.width / 2 + x, camera.height / 2 - y], -1)
+            x, y = (there[:, :2] / -there[:, 2:]).T
+        center_x, center_y = camera.principal_point(self.view)
+        seen = np.stack([center_x + camera.focal_px * x, center_y - camera.focal_y_px * y], -1)
         seen[there[:, 2] >= 0] = np.nan
         return (seen - self.centres).reshape(*self.shape, 2).astype(np.float32)
 
@@ -123,7 +124,7 @@ def find_surfaces(
         corners=caster.geometry.triangles[points.triangle[is_hit]],
         weights=points.weights[is_hit],
         centres=np.stack([columns, rows], -1) + 0.5,
-        rays=caster.directions(rows, columns),
+        rays=caster.directions(view, rows, columns),
     )
 
 
@@ -171,16 +172,22 @@ class ExtraTargets:
         self._caster, self._kinds = caster, kinds
 
     def make(
-        self, view: View, frame: int, object_index: NDArray[np.integer[Any]]
+        self,
+        view: View,
+        frame: int,
+        object_index: NDArray[np.integer[Any]],
+        disparity: NDArray[np.float64],
     ) -> dict[tuple[str, Direction | None], NDArray[Any]]:
         """The arrays of one view and frame, by kind and direction of time.
 
-        frame: The instant, from 0. object_index: (H, W) of that view and frame.
+        frame: The instant, from 0. object_index, disparity: (H, W) of that view and frame.
         """
         made: dict[tuple[str, Direction | None], NDArray[Any]] = {}
         if "material_index" in self._kinds:
             made["material_index", None] = material_index(self._caster.geometry.scene, object_index)
-        if set(self._kinds) <= {"material_index"}:
+        if "depth" in self._kinds:
+            made["depth", None] = self._caster.geometry.scene.camera.depth(disparity).astype(np.float32)
+        if set(self._kinds) <= {"depth", "material_index"}:
             return made
         pixels = np.indices(object_index.shape)
         surfaces = find_surfaces(self._caster, view, frame, pixels[0], pixels[1])

@@ -20,7 +20,8 @@ from datagen.recipe.curation import Curation
 from datagen.recipe.disparity_histogram import DisparityHistogram, fit_components, with_depths
 from datagen.recipe.disparity_range import REACHED_PERCENT, with_disparity_at
 from scenes import FAMILIES, FamilyConfig, Scene, sample_scene
-from scenes.serialization import OMIT_DEFAULT, from_plain, to_plain
+from scenes.serialization import from_plain, to_plain
+from scenes.spec import OMIT_DEFAULT
 from scenes.user_assets.pool import AssetPool
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import write_text
@@ -106,6 +107,10 @@ class Recipe:
                 self.world.within_disparities(*self.curation.disparity_px)
         except ValueError as error:
             raise DatasetError(str(error)) from error
+        if self.world.rig and (self.disparities or self.curation.disparity_px):
+            raise DatasetError(
+                "a recipe has a rig of its own or asks for disparities, not both: they are met by choosing the baseline"
+            )
         if self.disparities and self.curation.disparity_px:
             raise DatasetError("a recipe has a range of disparities or a histogram of them, not both")
         if self.seed < 0:

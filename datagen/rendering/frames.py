@@ -132,14 +132,14 @@ def render_frames(
             if "final" in options.passes:
                 with watch.step("render_final"), quiet(log):
                     for view, radiance in render_final(world, frame, exposure, scratch).items():
-                        light = sensor.expose(radiance, exposure, view, frame)
-                        images[view]["final"] = develop(light, 1.0)
+                        light = sensor.expose(sensor.project(radiance, view), exposure, view, frame)
+                        images[view]["final"] = sensor.store(develop(light, 1.0))
             with watch.step("ground_truth"):
                 targets = {}
                 for view in VIEWS:
                     hits = caster.cast_all(view, frame)
                     chosen = {name: images[view][name] for name in options.passes}
-                    extra = extra_targets.make(view, frame, hits.object_index)
+                    extra = extra_targets.make(view, frame, hits.object_index, hits.disparity)
                     targets[view] = _targets(chosen, hits, options.gradient_threshold_px, extra)
             yield frame, targets
     except RuntimeError as error:

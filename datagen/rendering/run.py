@@ -16,6 +16,7 @@ from datagen.errors import DatasetError, DiskFullError, MachineError
 from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
 from datagen.executors.devices import assign_devices, find_gpus
 from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_from_text, write_recipe
+from datagen.rendering.card import update_card
 from datagen.rendering.preflight import NO_BLENDER, check_device, check_disparity_range, has_blender
 from datagen.rendering.quarantine import (
     QuarantinedScene,
@@ -128,6 +129,7 @@ def render_dataset(
         if jobs and not isinstance(tree, LocalTree):
             run.begun_before = begun_before(tree, recipe.scenes)
         run.go(executor, jobs)
+        update_card(tree, area)
     asked = run.quarantined if only is None else run.quarantined & set(only)
     failures = tuple(
         read_quarantined(tree, *scene) for scene in wanted if scene in asked - run.not_replaced.keys()

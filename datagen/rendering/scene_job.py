@@ -16,7 +16,10 @@ from datagen.dataset.layout import FIRST_FRAME, RENDER_PASSES, Direction, Layout
 from datagen.dataset.manifest import SceneManifest, file_entry, write_manifest
 from datagen.errors import DatasetError, MachineError
 from datagen.formats import (
+    cameras_record,
     write_camera_data,
+    write_cameras,
+    write_depth,
     write_flow,
     write_gradient,
     write_mask,
@@ -121,6 +124,7 @@ def _render_attempt(
 
 
 _EXTRA_WRITERS: dict[str, Callable[[Path, Any], None]] = {
+    "depth": write_depth,
     "material_index": write_png,
     "normals": write_normals,
     "optical_flow": write_flow,
@@ -149,6 +153,8 @@ def _write_scene_files(layout: Layout, job: SceneJob, scene: Scene) -> None:
         for frame in range(scene.frames)
     }
     write_camera_data(layout.file("camera_data", job.split, job.scene), poses)
+    times = {FIRST_FRAME + frame: float(frame) for frame in range(scene.frames)}
+    write_cameras(layout.file("cameras", job.split, job.scene), cameras_record(scene.camera, times))
     write_text(layout.scene_record(job.split, job.scene), scene_to_json(scene))
 
 

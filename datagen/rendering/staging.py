@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PurePosixPath
 
-from datagen.dataset.layout import KINDS, Layout, SceneKey
+from datagen.dataset.layout import FOLDERS, Layout, SceneKey
 from datagen.dataset.manifest import SceneManifest, read_manifest
 from datagen.rendering.quarantine import release
 from stereoforge_kit.files import (
@@ -169,8 +169,8 @@ def begun_before(tree: Tree, splits: Iterable[str]) -> set[SceneKey]:
     """(split, number) of every scene that has a folder of files of any kind behind a URL, finished or not."""
     found = set()
     for split in splits:
-        for kind in KINDS:
-            folder = Layout(Path()).scene_folder(kind, split, 0).parent.as_posix()
+        for path in Layout(Path()).scene_paths(split, 0)[: len(FOLDERS)]:
+            folder = path.parent.as_posix()
             found |= {(split, int(name)) for name in tree.files_in(folder) if name.isdigit()}
     return found
 

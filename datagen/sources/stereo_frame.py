@@ -51,7 +51,7 @@ class StereoFrame(Protocol):
 
     @property
     def disparity_left(self) -> DisparityMap:
-        """(H, W) pixels, x_right = x_left - d; NaN invalid, 0 infinitely far."""
+        """(H, W) pixels, x_right = x_left - d; NaN invalid, 0 infinitely far unless the principal points differ."""
 
     @property
     def disparity_right(self) -> DisparityMap | None:
@@ -105,7 +105,9 @@ class FileFrame:
     read_object_index_left: Callable[[], NDArray[np.uint16]] | None = None
     read_foreground_left: Callable[[], NDArray[np.uint16]] | None = None
     disparity_noise_px: float = GROUND_TRUTH_NOISE_PX
-    """Disparities that are negative by more than this are none."""
+    """Disparities that are less than at infinity by more than this are none."""
+    find_disparity_at_infinity: Callable[[], float] = float
+    """The disparity of what is infinitely far, 0 unless the views' principal points differ."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -139,7 +141,7 @@ class FileFrame:
         if self.read_disparity_right is None:
             return None
         disparity = self._checked("right disparity", self.read_disparity_right())
-        return drop_impossible(disparity, self.disparity_noise_px)[0]
+        return self._possible(disparity)[0]
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -191,7 +193,10 @@ class FileFrame:
     @cached_property
     def _disparity_left(self) -> tuple[DisparityMap, ImpossibleShare]:
         disparity = self._checked("left disparity", self.read_disparity_left())
-        return drop_impossible(disparity, self.disparity_noise_px)
+        return self._possible(disparity)
+
+    def _possible(self, disparity: DisparityMap) -> tuple[DisparityMap, ImpossibleShare]:
+        return drop_impossible(disparity, self.disparity_noise_px, self.find_disparity_at_infinity())
 
     @cached_property
     def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

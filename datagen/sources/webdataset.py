@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from itertools import groupby
+from math import isfinite
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, overload
@@ -168,7 +169,19 @@ def _frame(shard: str, key: str) -> FileFrame:
         read_disparity_right=partial(read, "disparity_right.pfm", _decode_disparity),
         read_occlusion_left=partial(read, "occlusion_left.png", _decode_occlusion),
         read_object_index_left=partial(read, "object_index_left.png", decode_png),
+        find_disparity_at_infinity=partial(_disparity_at_infinity, shard, key),
     )
+
+
+def _disparity_at_infinity(shard: str, key: str) -> float:
+    """cx_left - cx_right of a sample's description; 0 if it does not say them."""
+    description = _description(shard, key)
+    left, right = (description.get(name, 0.0) for name in ("cx_left", "cx_right"))
+    if not (isinstance(left, int | float) and isinstance(right, int | float) and isfinite(left - right)):
+        raise FormatError(
+            f"{shard}: {key}.{META} does not describe its sample (cx_left or cx_right is no number)"
+        )
+    return float(left - right)
 
 
 def _decode_occlusion(data: bytes, origin: str) -> NDArray[np.uint8]:

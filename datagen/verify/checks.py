@@ -19,6 +19,7 @@ from datagen.dataset.layout import View
 from datagen.formats.occlusion import OCCLUDED, OUT_OF_FRAME, VISIBLE
 from datagen.ground_truth.labels import forward_differences, gradient_validity
 from datagen.ground_truth.raycast import Hits
+from scenes.spec import StereoCamera
 
 CONSISTENCY_TOLERANCE_PX = 0.25
 """How far a visible pixel's disparity may lie outside those of the two pixels it falls between."""
@@ -30,6 +31,8 @@ FRAME_TIE_PX = 1e-3
 """A point this close to the edge of the other view's frame may have either label."""
 GEOMETRY_TOLERANCE_PX = 1e-2
 """How far a sampled disparity may be from the scene's geometry."""
+DEPTH_TOLERANCE_PX = 1e-4
+"""How far the disparity of a stored depth may be from the stored disparity."""
 MAX_OFF_GEOMETRY = 0.01
 """Share of sampled pixels that may differ from the scene's geometry by more than the tolerance."""
 MAX_OFF_LABELS = 0.03
@@ -38,14 +41,15 @@ MIN_COUNTED = 50
 """Shares of fewer pixels than this are not judged."""
 
 
-def check_disparity(disparity: NDArray[np.float32]) -> Iterator[str]:
-    """A disparity (H, W) is finite and not negative: a rendered world has no pixel without ground truth."""
+def check_disparity(disparity: NDArray[np.float32], at_infinity: float) -> Iterator[str]:
+    """A disparity (H, W) is finite and no less than at infinity: a rendered world has no pixel without ground truth."""
     wrong = int((~np.isfinite(disparity)).sum())
     if wrong:
         yield f"{wrong} disparities are not finite"
-    negative = int((disparity < 0).sum())
-    if negative:
-        yield f"{negative} disparities are negative, the least {np.nanmin(disparity):.3f} px"
+    less = int((disparity < np.float32(at_infinity)).sum())
+    if less:
+        beyond = "negative" if at_infinity == 0 else f"below {at_infinity:.3f} px, that of infinity"
+        yield f"{less} disparities are {beyond}, the least {np.nanmin(disparity):.3f} px"
 
 
 def check_gradient(
@@ -68,12 +72,12 @@ def check_gradient(
 
 
 def check_object_index(
-    index: NDArray[np.uint16], disparity: NDArray[np.float32], objects: int
+    index: NDArray[np.uint16], disparity: NDArray[np.float32], objects: int, at_infinity: float
 ) -> Iterator[str]:
     """Object indices (H, W) name objects that exist, and exactly the sky (index 0) is infinitely far."""
     if index.max() > objects:
         yield f"object index {index.max()} is beyond the scene's {objects} objects"
-    wrong = int(((index == 0) != (disparity == 0)).sum())
+    wrong = int(((index == 0) != (disparity == np.float32(at_infinity))).sum())
     if wrong:
         yield f"{wrong} pixels are sky in one of object index and disparity but not in the other"
 
@@ -172,6 +176,19 @@ def check_vectors(
         MAX_OFF_GEOMETRY,
         f"sampled values are over {tolerance} from the scene's geometry",
     )
+
+
+def check_depth(
+    depth: NDArray[np.float32], disparity: NDArray[np.float32], camera: StereoCamera
+) -> Iterator[str]:
+    """A depth (H, W) in metres has the stored disparity (H, W), and the sky has none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        expected = camera.disparity_metres / depth.astype(np.float64) + camera.disparity_at_infinity
+        # Both are rounded to 32 bits.
+        same = np.abs(expected - disparity) <= DEPTH_TOLERANCE_PX + 1e-6 * np.abs(disparity)
+    wrong = int((~same | ~(depth > 0)).sum())
+    if wrong:
+        yield f"{wrong} depths are not those of the disparity"
 
 
 def check_derived(values: NDArray[Any], expected: NDArray[Any], origin: str) -> Iterator[str]:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from itertools import islice
 from pathlib import Path
 
-from datagen.dataset.layout import KINDS, SPLITS, Layout, SceneKey
-from datagen.dataset.remote_cache import RemoteLayout, open_remote
-from datagen.dataset.samples import open_layout
+from datagen.dataset.layout import FOLDERS, SPLITS, Layout, SceneKey
+from datagen.dataset.remote_cache import RemoteLayout
+from datagen.dataset.samples import opened_layout
 from datagen.errors import MachineError
 from datagen.recipe.recipe import Recipe, read_recipe, recipe_to_text
+from datagen.rendering.card import CARD, is_of_these_scenes
 from datagen.rendering.quarantine import quarantined_scenes
 from datagen.rendering.run import local_executor
 from datagen.verify.report import Problem, VerifyReport
 from datagen.verify.scene_check import SAMPLED_PIXELS, SceneCheck
 from datagen.verify.shard_check import has_shards, verify_shards
-from stereoforge_kit.files import LocalTree, open_tree, temporary_folder
+from stereoforge_kit.files import open_tree
 
 FEW_SCENES = 8
 """Fewer scenes than this are checked in this process: others would take longer to start."""
@@ -55,7 +56,7 @@ def verify_dataset(
     tree = open_tree(root)
     if has_shards(tree):
         return verify_shards(tree, progress, workers=workers)
-    with _opened(root) as layout:
+    with opened_layout(root) as layout:
         recipe = read_recipe(layout.recipe)
         checks = [
             SceneCheck(layout, recipe, split, scene, sampled_pixels)
@@ -74,6 +75,10 @@ def verify_dataset(
             problems += _recipe_problems(layout, recipe)
             problems += _unfinished(layout, recipe)
             problems += _orphans(layout, (result.known for result in results))
+            if not is_of_these_scenes(layout, recipe):
+                problems.append(
+                    Problem(CARD, "is the card of other scenes; stereoforge render writes it anew")
+                )
     return VerifyReport(
         root=layout.tree.name,
         scenes=len(results),
@@ -83,17 +88,6 @@ def verify_dataset(
         seconds=time.perf_counter() - start,
         problems=tuple(problems),
     )
-
-
-@contextmanager
-def _opened(root: Path | str) -> Iterator[Layout]:
-    """The layout of a folder, or that of a URL with a cache that is removed afterwards."""
-    tree = open_tree(root)
-    if isinstance(tree, LocalTree):
-        yield open_layout(root)
-        return
-    with temporary_folder() as folder:
-        yield open_remote(tree, folder)
 
 
 def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
@@ -157,7 +151,7 @@ def _unfinished(layout: Layout, recipe: Recipe) -> Iterator[Problem]:
 def _orphans(layout: Layout, known_by_scene: Iterable[set[str]]) -> Iterator[Problem]:
     """Files in the data set's folders that belong to no finished scene."""
     known = set().union(*known_by_scene)
-    for folder in (*KINDS, "scenes", "manifest"):
+    for folder in (*FOLDERS, "scenes", "manifest"):
         for name in layout.tree.files_below(folder):
             if name not in known:
                 yield Problem(name, "belongs to no finished scene")

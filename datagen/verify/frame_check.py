@@ -22,6 +22,7 @@ from datagen.ground_truth.targets import (
 from datagen.recipe.recipe import Recipe
 from datagen.verify.checks import (
     check_boundaries,
+    check_depth,
     check_derived,
     check_disparity,
     check_geometry,
@@ -66,7 +67,9 @@ class FrameCheck:
         unusable = [
             (self._file("disparity", view), message)
             for view in VIEWS
-            for message in check_disparity(sample.view(view).disparity)
+            for message in check_disparity(
+                sample.view(view).disparity, self.scene.camera.disparity_at_infinity
+            )
         ]
         if unusable:  # Other problems would only follow from this one.
             yield from unusable
@@ -89,7 +92,10 @@ class FrameCheck:
         arrays, other = sample.view(view), sample.view("right" if view == "left" else "left")
         threshold_px = self.recipe.gradient_threshold_px
         yield from check_gradient(arrays.disparity, arrays.gradient, arrays.gradient_valid, threshold_px)
-        yield from check_object_index(arrays.object_index, arrays.disparity, len(self.scene.objects))
+        at_infinity = self.scene.camera.disparity_at_infinity
+        yield from check_object_index(
+            arrays.object_index, arrays.disparity, len(self.scene.objects), at_infinity
+        )
         yield from check_views(view, arrays.disparity, other.disparity, arrays.occlusion)
         if self.caster is None:
             return
@@ -114,7 +120,7 @@ class FrameCheck:
         sample, kinds = self.samples[0], self.recipe.targets
         rows, columns = self._sampled(view)
         surfaces = None
-        if self.caster is not None and not set(kinds) <= {"material_index", "motion_boundaries"}:
+        if self.caster is not None and not set(kinds) <= {"depth", "material_index", "motion_boundaries"}:
             surfaces = find_surfaces(self.caster, view, sample.frame - FIRST_FRAME, rows, columns)
         if "material_index" in kinds:
             stored, index = sample.material_index(view), sample.view(view).object_index
@@ -122,6 +128,9 @@ class FrameCheck:
                 worn = material_index(self.scene, index)
                 for message in check_derived(stored, worn, "the objects' materials"):
                     yield self._file("material_index", view), message
+        if "depth" in kinds:
+            for message in check_depth(sample.depth(view), sample.view(view).disparity, self.scene.camera):
+                yield self._file("depth", view), message
         if "normals" in kinds:
             normals = sample.normals(view)[rows, columns]
             if surfaces is not None:

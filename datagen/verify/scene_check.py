@@ -6,6 +6,7 @@ import errno
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from datagen.dataset.layout import FIRST_FRAME, KINDS, RENDER_PASSES, TARGETS, V
 from datagen.dataset.manifest import FileEntry, SceneManifest, read_manifest
 from datagen.dataset.samples import StereoSample, read_scene
 from datagen.errors import DatasetError
-from datagen.formats import read_camera_data
+from datagen.formats import cameras_record, read_camera_data, read_cameras
 from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.recipe.recipe import Recipe
@@ -122,6 +123,9 @@ class SceneCheck:
         camera_data = self.layout.file("camera_data", self.split, self.scene)
         if self._are_readable([camera_data]):
             self._check_camera_data(camera_data, scene)
+        cameras = self.layout.file("cameras", self.split, self.scene)
+        if self._are_readable([cameras]):
+            self._check_cameras(cameras, scene)
         for instant in range(scene.frames):
             self.frames += 1
             if self._are_readable(self._frame_files(FIRST_FRAME + instant)):
@@ -149,6 +153,17 @@ class SceneCheck:
         except DatasetError as error:
             self._failed(error)
 
+    def _check_cameras(self, path: Path, scene: Scene) -> None:
+        """Check that the intrinsics and poses on disk are those of the scene's camera."""
+        try:
+            found = read_cameras(path)
+        except DatasetError as error:
+            self._failed(error)
+            return
+        expected = cameras_record(scene.camera, {FIRST_FRAME + k: float(k) for k in range(scene.frames)})
+        if not _is_near(found, expected):
+            self._found(path, "its numbers are not those of the scene's camera")
+
     def _check_camera_data(self, path: Path, scene: Scene) -> None:
         """Check that the poses on disk are those of the scene's camera."""
         try:
@@ -164,3 +179,18 @@ class SceneCheck:
         for frame, matrices in poses.items():
             if not np.allclose(matrices, expected[frame], rtol=0, atol=POSE_TOLERANCE):
                 self._found(path, f"the poses of frame {frame} are not those of the scene's camera")
+
+
+def _is_near(found: Any, expected: Any) -> bool:
+    """Whether two JSON values are alike but for the last digits of their numbers."""
+    if isinstance(expected, dict):
+        return (
+            isinstance(found, dict)
+            and found.keys() == expected.keys()
+            and all(_is_near(found[key], value) for key, value in expected.items())
+        )
+    try:
+        one, two = np.asarray(found, np.float64), np.asarray(expected, np.float64)
+    except (TypeError, ValueError):
+        return False
+    return one.shape == two.shape and np.allclose(one, two, rtol=POSE_TOLERANCE, atol=POSE_TOLERANCE)

@@ -32,7 +32,6 @@ from scenes.spec import (
     Scene,
     SceneObject,
     Shape,
-    StereoCamera,
     SunLight,
     Texture,
     Trajectory,
@@ -63,10 +62,10 @@ class FlyingThingsConfig(FamilyConfig):
     """Static objects on the ground per scene."""
     background_materials: Count = (8, 16)
     """Different materials the background objects of a scene share; every flying object has its own."""
-    focal_mm: Range = (35.0, 35.0)
-    """Focal length on a sensor 32 mm wide."""
-    baseline_m: Range = (1.0, 1.0)
-    """Distance between the cameras."""
+    focal_mm: Range = (18.0, 60.0)
+    """Focal length on a sensor 32 mm wide (35 as published)."""
+    baseline_m: Range = (0.05, 1.0)
+    """Distance between the cameras (1 as published); everything scales with it."""
     disparity_share: Range = (0.002, 0.167)
     """Disparity of the farthest and the nearest surface, as a share of the image width: 2 to 160 px at 960."""
     background_disparity_share: Range = (0.005, 0.04)
@@ -208,7 +207,7 @@ def _sample_rig(rng: np.random.Generator, config: FlyingThingsConfig) -> _Rig:
     pitch, roll = uniform(rng, *config.pitch_deg), uniform(rng, *config.roll_deg)
     # At a pitch of -90 degrees a camera looks straight down at -z; raised by 90 it looks along +y.
     attitude = Rotation.from_euler("XZ", (90.0 - pitch, roll), degrees=True)
-    still = StereoCamera(config.width, config.height, focal_mm, baseline_m, Trajectory.static())
+    still = config.camera(focal_mm, baseline_m, Trajectory.static())
     nearest_m = still.disparity_metres / (config.disparity_share[1] * config.width)
     motion = wander(
         rng,
@@ -220,8 +219,7 @@ def _sample_rig(rng: np.random.Generator, config: FlyingThingsConfig) -> _Rig:
         reach_m=0.25 * nearest_m,
         reach_deg=4.0,
     )
-    camera = StereoCamera(config.width, config.height, focal_mm, baseline_m, motion)
-    return _Rig(camera, config.frames, config)
+    return _Rig(replace(still, motion=motion), config.frames, config)
 
 
 def _final(rng: np.random.Generator, rig: _Rig) -> FinalPass:

@@ -126,11 +126,11 @@ def sample_monkaa(rng: np.random.Generator, config: MonkaaConfig) -> Scene:
 
 def _sample_plan(rng: np.random.Generator, config: MonkaaConfig) -> _Plan:
     place = "cave" if chance(rng, config.cave_share) else choose(rng, PLACES[:3], (0.45, 0.3, 0.25))
-    depth_m, focal_mm = uniform(rng, *config.focus_distance_m), uniform(rng, *config.focal_mm)
+    depth_m, focal_mm = uniform(rng, *config.focus_distance_m), config.lens_mm(uniform(rng, *config.focal_mm))
     size_m = uniform(rng, *config.focus_height_share) * 2 * half_height(focal_mm, config) * depth_m
     land = _sample_land(rng, place, depth_m)
     focus = sample_focus(rng, config, focal_mm, depth_m, size_m, uniform(rng, 0.45, 1.1) * size_m)
-    camera = sample_camera(rng, config.width, config.height, config.frames, land, focus)
+    camera = sample_camera(rng, config, land, focus)
     return _Plan(place, depth_m, size_m, GroundPlacement(land, camera, config.frames, 1.15 * focus.nearest_m))
 
 

@@ -67,9 +67,9 @@ class SintelConfig(LandscapeConfig):
 
     crowd = ("people", "trees", "structures", "boulders", "plants")
 
-    focal_mm: Range = (26.0, 60.0)
+    focal_mm: Range = (20.0, 60.0)
     """Focal length on a sensor 32 mm wide."""
-    focus_disparity_share: Range = (0.01, 0.036)
+    focus_disparity_share: Range = (0.01, 0.05)
     """Disparity of the main person, as a share of the image width (0.01 is 10 px at 960);
     it sets the baseline."""
     focus_height_share: Range = (0.35, 0.8)
@@ -161,11 +161,11 @@ def sample_sintel(rng: np.random.Generator, config: SintelConfig) -> Scene:
 def _sample_plan(rng: np.random.Generator, config: SintelConfig) -> _Plan:
     names = sorted(_PLACES)
     name = choose(rng, names, [_PLACES[key].share for key in names])
-    place, focal_mm = _PLACES[name], uniform(rng, *config.focal_mm)
+    place, focal_mm = _PLACES[name], config.lens_mm(uniform(rng, *config.focal_mm))
     depth_m = PERSON_M / (2 * half_height(focal_mm, config) * uniform(rng, *config.focus_height_share))
     land = _sample_land(rng, place, depth_m)
     focus = sample_focus(rng, config, focal_mm, depth_m, PERSON_M, uniform(rng, 0.5, 1.3) * PERSON_M)
-    camera = sample_camera(rng, config.width, config.height, config.frames, land, focus)
+    camera = sample_camera(rng, config, land, focus)
     return _Plan(name, place, depth_m, GroundPlacement(land, camera, config.frames, 1.15 * focus.nearest_m))
 
 

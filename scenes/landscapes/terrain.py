@@ -14,7 +14,7 @@ from scenes.family import FamilyConfig
 from scenes.motion.trajectories import KEY_SPACING_FRAMES, vector, wander
 from scenes.random_draws import Range, chance, log_uniform, uniform
 from scenes.shapes.nature.landforms import Landscape
-from scenes.spec import Color, FinalPass, Fog, StereoCamera
+from scenes.spec import SENSOR_WIDTH_MM, Color, FinalPass, Fog, StereoCamera
 from stereoforge_kit.errors import InputError
 
 NEAREST_SHARE = 0.105
@@ -25,9 +25,9 @@ NEAREST_SHARE = 0.105
 class LandscapeConfig(FamilyConfig):
     """Settings that the landscape families share: a camera that looks at a character on open land."""
 
-    focal_mm: Range = (22.0, 45.0)
+    focal_mm: Range = (18.0, 60.0)
     """Focal length on a sensor 32 mm wide."""
-    focus_disparity_share: Range = (0.016, 0.045)
+    focus_disparity_share: Range = (0.014, 0.052)
     """Disparity of the main character, as a share of the image width (0.016 is 15 px at 960);
     it sets the baseline."""
     focus_height_share: Range = (0.45, 0.8)
@@ -110,14 +110,14 @@ class Focus:
 
 
 def sample_camera(
-    rng: np.random.Generator, width: int, height: int, frames: int, land: Land, focus: Focus
+    rng: np.random.Generator, config: LandscapeConfig, land: Land, focus: Focus
 ) -> StereoCamera:
     """A rig over the world's origin that looks along +y at the subject, on a smooth path.
 
     The baseline gives the subject its disparity. The path stays clear of the ground.
     """
-    focal_px = focus.focal_mm / 32.0 * width
-    baseline_m = focus.disparity_share * width * focus.depth_m / focal_px
+    focal_px = focus.focal_mm / SENSOR_WIDTH_MM * config.width
+    baseline_m = focus.disparity_share * config.width * focus.depth_m / focal_px
     reach_m = min(focus.speed_m * KEY_SPACING_FRAMES / 2, 0.12 * focus.depth_m)
     angle = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle)], -1)
@@ -128,7 +128,7 @@ def sample_camera(
     pitch_deg = math.degrees(math.atan2(eye_m - target_m, focus.depth_m)) - focus.above_deg
     motion = wander(
         rng,
-        frames,
+        config.frames,
         np.array((-baseline_m / 2, 0.0, eye_m)),
         Rotation.from_euler("XZ", (90.0 - pitch_deg, uniform(rng, -2.0, 2.0)), degrees=True),
         speed_m=focus.speed_m,
@@ -136,11 +136,13 @@ def sample_camera(
         reach_m=reach_m,
         reach_deg=3.0,
     )
-    return StereoCamera(width, height, focus.focal_mm, baseline_m, motion)
+    return config.camera(focus.focal_mm, baseline_m, motion)
 
 
 def half_height(focal_mm: float, config: FamilyConfig) -> float:
-    """Tangent of half the vertical field of view."""
+    """Tangent of half the vertical field of view, or of its larger part where a rig's is not in the middle."""
+    if config.rig:
+        return max(config.rig.cy, config.height - config.rig.cy) / config.rig.fy
     return 16.0 / focal_mm * config.height / config.width
 
 
@@ -154,9 +156,12 @@ def sample_focus(
 ) -> Focus:
     """How a camera sees a subject about mid-image, of a size, at a depth, from about a height.
 
-    The camera is raised where the image's lower edge would otherwise show ground nearer than allowed.
+    A rig of the user's own decides the disparity. The camera is raised where the image's lower edge would otherwise
+    show ground nearer than allowed.
     """
     share = uniform(rng, *config.focus_disparity_share)
+    if config.rig:
+        share = config.rig.fx * config.rig.baseline_m / (depth_m * config.width)
     half_high = half_height(focal_mm, config)
     height_m = max(camera_height_m, 1.3 * (half_high + 0.1) * depth_m * share / NEAREST_SHARE)
     return Focus(

@@ -12,8 +12,13 @@ from scenes.spec import StereoCamera
 
 
 def half_view(camera: StereoCamera) -> tuple[float, float]:
-    """Tangents of half the horizontal and of half the vertical field of view."""
-    return camera.width / 2 / camera.focal_px, camera.height / 2 / camera.focal_px
+    """Tangents of half the horizontal and of half the vertical field of view.
+
+    They are those of the least field of view about the optical axis that holds both views.
+    """
+    aside = max(abs(camera.center_left_px), abs(camera.center_right_px))
+    across, down = camera.width / 2 + aside, camera.height / 2 + abs(camera.center_down_px)
+    return across / camera.focal_px, down / camera.focal_y_px
 
 
 def camera_positions(camera: StereoCamera, frames: int) -> NDArray[np.float64]:

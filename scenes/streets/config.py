@@ -19,9 +19,9 @@ class DrivingConfig(FamilyConfig):
     crowd = ("parked_share", "pedestrians_per_100m", "furniture_per_100m")
     sparsity = ("headway_m", "tree_spacing_m", "lamp_spacing_m")
 
-    focal_lengths_mm: tuple[float, ...] = (15.0, 35.0)
+    focal_lengths_mm: tuple[float, ...] = (13.0, 15.0, 20.0, 26.0, 35.0, 50.0)
     """Focal lengths to choose from, on a sensor 32 mm wide."""
-    baseline_m: Range = (0.5, 1.0)
+    baseline_m: Range = (0.25, 1.2)
     """Distance between the cameras; made smaller where the road would come nearer than allowed."""
     largest_disparity_share: float = 0.2
     """Nothing in view has a larger disparity, as a share of the image width: 192 px at 960."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from scenes.motion.trajectories import quaternion, vector
+from scenes.placement.view import half_view
 from scenes.random_draws import chance, choose, integer, uniform
 from scenes.shapes.street.road import Course
 from scenes.spec import StereoCamera, Trajectory
@@ -94,14 +95,16 @@ def sample_drive(rng: np.random.Generator, config: DrivingConfig) -> Drive:
 def sample_camera(rng: np.random.Generator, config: DrivingConfig, drive: Drive) -> StereoCamera:
     """Draw the rig's camera, moving along the drive.
 
-    Its baseline is so small that the road keeps within the largest disparity allowed.
+    Its baseline is so small that the road keeps within the largest disparity allowed; a rig of the user's own stays as
+    it is.
     """
     focal_mm = choose(rng, config.focal_lengths_mm)
     height_m, pitch = uniform(rng, *config.camera_height_m), uniform(rng, *config.pitch_deg)
     roll, yaw = uniform(rng, *config.roll_deg), uniform(rng, *config.yaw_deg)
     baseline_m = uniform(rng, *config.baseline_m)
-    still = StereoCamera(config.width, config.height, focal_mm, baseline_m, Trajectory.static())
-    baseline_m = min(baseline_m, _largest_baseline_m(config, still, height_m, pitch, roll))
+    still = config.camera(focal_mm, baseline_m, Trajectory.static())
+    largest_m = _largest_baseline_m(config, still, height_m, pitch, roll)
+    baseline_m = still.baseline_m if config.rig else min(baseline_m, largest_m)
     aside = uniform(rng, -0.25, 0.25)
     times, places, turns = [], [], []
     count = 2 + math.floor(2 * drive.reach_m / _KEY_M)
@@ -115,14 +118,14 @@ def sample_camera(rng: np.random.Generator, config: DrivingConfig, drive: Drive)
         places.append(vector(middle - attitude.as_matrix()[:, 0] * baseline_m / 2))
         turns.append(quaternion(attitude))
     motion = Trajectory(tuple(times), tuple(places), tuple(turns))
-    return StereoCamera(config.width, config.height, focal_mm, baseline_m, motion)
+    return config.camera(focal_mm, baseline_m, motion)
 
 
 def _largest_baseline_m(
     config: DrivingConfig, camera: StereoCamera, height_m: float, pitch_deg: float, roll_deg: float
 ) -> float:
     """The baseline at which the road at the lower edge of the image has the largest disparity allowed."""
-    half_x, half_y = (size / 2 / camera.focal_px for size in (config.width, config.height))
+    half_x, half_y = half_view(camera)
     down = math.radians(pitch_deg + 0.5)
     lean = math.radians(abs(roll_deg) + 0.4)
     # How far a ray through a lower corner drops for every metre of depth.

@@ -25,8 +25,12 @@ class Export:
 
     data: Annotated[tyro.conf.Positional[str], shown("DIR")]
     """Folder of the data set, or its URL."""
-    format: Annotated[Literal["kitti", "sceneflow", "webdataset"], shown("kitti|sceneflow|webdataset")]
-    """kitti: 16-bit PNG disparities; sceneflow: what FlyingThings3D has; webdataset: tar files."""
+    format: Annotated[
+        Literal["kitti", "sceneflow", "webdataset", "depth", "coco"],
+        shown("kitti|sceneflow|webdataset|depth|coco"),
+    ]
+    """kitti: 16-bit PNG disparities; sceneflow: what FlyingThings3D has; webdataset: tar files; depth: depths alone;
+    coco: instance masks alone, as COCO's JSON."""
     out: Annotated[str, shown("DIR2")]
     """Folder or URL to write to: new, empty, or with the same export, which continues."""
     render_pass: Annotated[Literal["clean", "final"], shown("clean|final")] = "clean"
@@ -35,7 +39,8 @@ class Export:
     """webdataset: frames in one tar file."""
     lidar_beams: Annotated[int | None, shown("N", "every pixel")] = None
     """kitti: keep only the disparities that a laser scanner with so many beams would measure (KITTI's has 64)."""
-
+    depth_as: Annotated[Literal["png", "npy"], shown("png|npy")] = "png"
+    """depth: 16-bit PNG files of millimetres (up to 65.535 m), or NumPy arrays of float32 metres."""
     overwrite: bool = False
     """Replace another export that is in --out, once this one is whole (behind a URL, before it is)."""
 
@@ -56,7 +61,8 @@ class Export:
         ]
         if not sets:
             raise CommandError(f"{self.data}: has no finished scene")
-        options: dict[str, dict[str, int | None]] = {
+        options: dict[str, dict[str, int | str | None]] = {
+            "depth": {"depth_as": self.depth_as},
             "webdataset": {"frames_per_shard": self.frames_per_shard},
             "kitti": {"lidar_beams": self.lidar_beams},
         }
@@ -66,7 +72,7 @@ class Export:
             remarks = EXPORTERS[self.format](
                 sets,
                 target,
-                ExportOptions(self.frames_per_shard, self.lidar_beams),
+                ExportOptions(self.frames_per_shard, self.lidar_beams, self.depth_as),
                 lambda done, total: progress.update(task, completed=done, total=total),
             )
         console.print(f"{self.out}: {sum(map(len, sets))} frames as {self.format}")

@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dataset
+from datagen.cameras.registry import read_calibration
 from datagen.dataset.layout import EXTRA_TARGETS, Layout
 from datagen.dataset.manifest import SceneManifest
 from datagen.executors import Executor
@@ -25,12 +26,13 @@ from datagen.recipe.recipe import fit_disparities
 from datagen.rendering.estimate import estimate_run
 from datagen.rendering.quarantine import QuarantinedScene, quarantined_scenes
 from datagen.rendering.run import SCENE_TIMEOUT_S, local_executor, ray_executor
-from scenes import FAMILIES
+from scenes import FAMILIES, FamilyConfig
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_histogram, parse_range, parse_shard, parse_size, shown
 from stereoforge.pipelines.rendering import choose_device
 from stereoforge.places import keep_apart
 from stereoforge.progress import console, progress_bar
+from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import open_tree
 from stereoforge_kit.viewing import duration
 
@@ -57,8 +59,11 @@ class Render:
     """How many scenes the split shall have in all."""
     frames_per_scene: Annotated[int | None, shown("N", 1)] = None
     """Frames in each scene."""
-    size: Annotated[str | None, shown("WxH", "960x540")] = None
+    size: Annotated[str | None, shown("WxH", "960x540, or the camera's")] = None
     """Image size in pixels."""
+    camera: Annotated[str | None, shown("FILE", "the family's cameras")] = None
+    """Render as a rig of your own sees: a calibration by OpenCV (YAML), Middlebury, KITTI, ROS (LEFT.yaml,RIGHT.yaml)
+    or as JSON. --size scales it to another size of the same shape."""
     split: Annotated[Literal["train", "val", "test"] | None, shown("train|val|test", "train")] = None
     """Which split to render; splits never share a scene, a mesh or a texture."""
     seed: Annotated[int | None, shown("N", 0)] = None
@@ -68,8 +73,8 @@ class Render:
     passes: Annotated[str | None, shown("LIST", "clean")] = None
     """Render passes, comma-separated: clean, and final with motion blur, defocus, fog and sensor noise."""
     targets: Annotated[str | None, shown("all|LIST", "none")] = None
-    """Targets besides disparity, gradient, occlusion and object index, comma-separated: material_index,
-    normals, optical_flow, disparity_change, motion_boundaries."""
+    """Targets besides disparity, gradient, occlusion and object index, comma-separated: depth,
+    material_index, normals, optical_flow, disparity_change, motion_boundaries."""
     device: Literal["auto", "cpu", "cuda", "optix", "hip", "metal"] = "auto"
     """What Cycles computes on; auto takes the GPU that Blender finds on this machine, else the cpu."""
     workers: Annotated[int | None, shown("N", "one a core")] = None
@@ -241,10 +246,7 @@ class Render:
         base = read_recipe(self.recipe) if self.recipe else self._default_recipe()
         if self.recipe and self.family not in (None, base.family):
             raise UsageError(f"--recipe {self.recipe} is of family {base.family}, not {self.family}")
-        world = base.world
-        if self.size is not None:
-            width, height = parse_size(self.size)
-            world = replace(world, width=width, height=height)
+        world = self._sized(base.world)
         if self.frames_per_scene is not None:
             if self.frames_per_scene < 1:
                 raise UsageError(f"--frames-per-scene must be at least 1, got {self.frames_per_scene}")
@@ -269,6 +271,26 @@ class Render:
             return replace(base, **changes)
         except DatasetError as error:
             raise UsageError(str(error)) from error
+
+    def _sized(self, world: FamilyConfig) -> FamilyConfig:
+        """The family's config with the images' size, and with the rig that is to see it."""
+        size = parse_size(self.size) if self.size is not None else None
+        if self.camera is None:
+            if size is None:
+                return world
+            if world.rig:
+                raise UsageError("--size goes with --camera here: the recipe has a rig of its own")
+            return replace(world, width=size[0], height=size[1])
+        calibration = read_calibration(self.camera)
+        try:
+            rig = calibration.rig(size)
+        except InputError as error:
+            raise UsageError(f"--camera {self.camera}: {error}") from error
+        if calibration.size not in (None, (rig.width, rig.height)):
+            console.print(
+                f"{self.camera}: scaled from {calibration.size[0]}x{calibration.size[1]} to {self.size}"
+            )
+        return replace(world, width=rig.width, height=rig.height, rig=rig)
 
     def _count(self, base: Recipe, split: str) -> int:
         """Scenes of a split of which --scenes does not say how many."""

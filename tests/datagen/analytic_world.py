@@ -16,7 +16,14 @@ from scipy.spatial.transform import Rotation
 
 from datagen.dataset.layout import FIRST_FRAME, Layout
 from datagen.dataset.manifest import FileEntry, SceneManifest, file_entry, read_manifest, write_manifest
-from datagen.formats import write_camera_data, write_gradient, write_occlusion, write_pfm, write_png
+from datagen.formats import (
+    write_camera_data,
+    write_cameras,
+    write_gradient,
+    write_occlusion,
+    write_pfm,
+    write_png,
+)
 from datagen.recipe.recipe import Recipe, write_recipe
 from scenes import FAMILIES, Scene, scene_to_json
 from scenes.shapes.solids.basic import Plane
@@ -204,12 +211,42 @@ def write_scene(layout: Layout, split: str, number: int, recipe: Recipe) -> None
         FIRST_FRAME + k: (scene.camera.pose("left", k), scene.camera.pose("right", k)) for k in range(FRAMES)
     }
     write_camera_data(paths[1], poses)
+    paths.append(layout.file("cameras", split, number))
+    write_cameras(paths[2], cameras_of(scene))
     for instant in range(FRAMES):
         for view in ("left", "right"):
             paths += write_view(
                 layout, split, number, view, FIRST_FRAME + instant, render(scene, view, instant)
             )
     commit(layout, split, number, [file_entry(layout.root, path) for path in paths], recipe)
+
+
+def cameras_of(scene: Scene) -> dict[str, object]:
+    """cameras.json by hand: OpenCV has y down, z forward and the first pixel's centre at 0."""
+    matrix = [[FOCAL_PX, 0, WIDTH / 2 - 0.5], [0, FOCAL_PX, HEIGHT / 2 - 0.5], [0, 0, 1]]
+    frames = {}
+    for k in range(FRAMES):
+        poses = {view: scene.camera.pose(view, k) @ np.diag((1, -1, -1, 1)) for view in CAMERA_OFFSET}
+        frames[str(FIRST_FRAME + k)] = {
+            view: {
+                "K": matrix,
+                "camera_to_world": pose.tolist(),
+                "world_to_camera": np.linalg.inv(pose).tolist(),
+            }
+            for view, pose in poses.items()
+        }
+    return {
+        "width": WIDTH,
+        "height": HEIGHT,
+        "fx": FOCAL_PX,
+        "fy": FOCAL_PX,
+        "cx_left": WIDTH / 2 - 0.5,
+        "cx_right": WIDTH / 2 - 0.5,
+        "cy": HEIGHT / 2 - 0.5,
+        "baseline_m": BASELINE_M,
+        "disparity_at_infinity": 0.0,
+        "frames": frames,
+    }
 
 
 def write_view(

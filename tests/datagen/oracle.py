@@ -20,26 +20,27 @@ def to_camera_frame(
 
 @njit(cache=True)
 def cast_depth(
-    triangles: NDArray[np.float64], width: int, height: int, focal_px: float, shift_px: float = 0.0
+    triangles: NDArray[np.float64], width: int, height: int, fx: float, fy: float, cx: float, cy: float
 ) -> NDArray[np.float64]:
-    """(H, W) depth along -z of the first surface through (column + 0.5 + shift, row + 0.5), inf for none.
+    """(H, W) depth along -z of the first surface through (column + 0.5, row + 0.5), inf for none.
 
     triangles: (T, 3, 3) in the camera's frame (x right, y up, looking along -z).
+    fx, fy, cx, cy: Focal lengths and principal point in px.
     """
     depth = np.full((height, width), np.inf)
     for k in range(triangles.shape[0]):
         t = triangles[k]
         if t[0, 2] >= -NEAR_M and t[1, 2] >= -NEAR_M and t[2, 2] >= -NEAR_M:
             continue
-        rows, columns = _window(t, width, height, focal_px)
+        rows, columns = _window(t, width, height, fx, fy, cx, cy)
         e1x, e1y, e1z = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
         e2x, e2y, e2z = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
         nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
         offset = nx * t[0, 0] + ny * t[0, 1] + nz * t[0, 2]
         for i in range(rows[0], rows[1] + 1):
-            y = -(i + 0.5 - height / 2) / focal_px
+            y = -(i + 0.5 - cy) / fy
             for j in range(columns[0], columns[1] + 1):
-                x = (j + 0.5 + shift_px - width / 2) / focal_px
+                x = (j + 0.5 - cx) / fx
                 slope = nx * x + ny * y - nz
                 if slope == 0.0:
                     continue
@@ -51,14 +52,14 @@ def cast_depth(
 
 @njit(cache=True)
 def _window(
-    t: NDArray[np.float64], width: int, height: int, focal_px: float
+    t: NDArray[np.float64], width: int, height: int, fx: float, fy: float, cx: float, cy: float
 ) -> tuple[tuple[int, int], tuple[int, int]]:
     """First and last row and column that a triangle can cover: all of them if it crosses the view's plane."""
     if t[0, 2] > -NEAR_M or t[1, 2] > -NEAR_M or t[2, 2] > -NEAR_M:
         return (0, height - 1), (0, width - 1)
     low_u, high_u, low_v, high_v = math.inf, -math.inf, math.inf, -math.inf
     for k in range(3):
-        u, v = -t[k, 0] / t[k, 2] * focal_px + width / 2, t[k, 1] / t[k, 2] * focal_px + height / 2
+        u, v = -t[k, 0] / t[k, 2] * fx + cx, t[k, 1] / t[k, 2] * fy + cy
         low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, v), max(high_v, v)
     first_row, last_row = max(0.0, low_v - 2), min(height - 1.0, high_v + 2)
     first_column, last_column = max(0.0, low_u - 2), min(width - 1.0, high_u + 2)

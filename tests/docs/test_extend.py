@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import torch
 
+from datagen.cameras.calibration import Calibration, CalibrationText
 from datagen.formats import write_pfm, write_png
 from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.scene_geometry import build_geometry
@@ -20,6 +21,7 @@ from datagen.recipe.recipe import Recipe
 from refine.method import EvaluationFrame
 from scenes import scene_from_json, scene_to_json
 from scenes.random_draws import integer
+from scenes.spec import Rig
 from training.networks import ConfNet, HeadConfig
 from training.networks.inference import estimate
 
@@ -37,7 +39,7 @@ def module(defines: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 def test_the_page_has_a_block_a_kind() -> None:
-    assert len(BLOCKS) == 6
+    assert len(BLOCKS) == 7
 
 
 def test_the_family_samples_worlds_that_can_be_rendered(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,6 +53,22 @@ def test_the_family_samples_worlds_that_can_be_rendered(monkeypatch: pytest.Monk
     assert any(
         fault_before_rendering(SceneRayCaster(build_geometry(scene)), curation) is None for scene in scenes
     )
+
+
+def test_the_family_can_be_seen_by_a_rig_of_ones_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    family = module("FAMILY = ", monkeypatch)["FAMILY"]
+    rig = Rig(96, 54, 90, 95, 50, 44, 30, 0.3)
+    camera = family.sample(np.random.default_rng(1), family.config(width=96, height=54, rig=rig)).camera
+    assert camera == rig.camera(camera.motion)
+
+
+def test_the_calibration_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    reader = module("READER = ", monkeypatch)["READER"]
+    texts = (CalibrationText("rig.txt", "rig 700 320 240 0.12 640 480\n"),)
+    assert reader.recognises(texts)
+    assert reader.read(texts) == Calibration(700, 700, 320, 320, 240, 0.12, (640, 480))
+    with pytest.raises(ValueError, match="are the views swapped"):
+        reader.read((CalibrationText("rig.txt", "rig 700 320 240 -0.12 640 480"),))
 
 
 def test_the_shape_is_closed_and_faces_outwards(monkeypatch: pytest.MonkeyPatch) -> None:

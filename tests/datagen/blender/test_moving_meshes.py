@@ -77,14 +77,15 @@ def test_every_frame_shows_the_shapes_of_its_instant(
     targets, blenders_triangles = frames[frame]
     own = build_geometry(scene)
     camera = scene.camera
+    intrinsics = (camera.focal_px, camera.focal_px, camera.width / 2, camera.height / 2)
     for corners in (own.vertices(frame)[own.triangles], blenders_triangles):
         triangles = to_camera_frame(corners, camera.pose(view, frame))
-        depth = cast_depth(triangles, camera.width, camera.height, camera.focal_px)
+        depth = cast_depth(triangles, camera.width, camera.height, *intrinsics)
         error = np.abs(targets[view].disparity - camera.disparity_metres / depth)
         assert np.percentile(error, 99.5) < 1e-3
     # The other frames' shapes do not fit.
     stale = to_camera_frame(own.vertices((frame + 1) % FRAMES)[own.triangles], camera.pose(view, frame))
-    depth = cast_depth(stale, camera.width, camera.height, camera.focal_px)
+    depth = cast_depth(stale, camera.width, camera.height, *intrinsics)
     error = np.abs(targets[view].disparity - camera.disparity_metres / depth)
     assert np.percentile(error, 95) > 0.01
 

@@ -28,6 +28,8 @@ LAYOUT = Layout(Path("/data"))
         (LAYOUT.file("occlusion", "train", 10000, "left", 6), "occlusion/TRAIN/A/10000/left/0006.png"),
         (LAYOUT.file("object_index", "train", 1, "left", 6), "object_index/TRAIN/A/0001/left/0006.png"),
         (LAYOUT.file("camera_data", "train", 1), "camera_data/TRAIN/A/0001/camera_data.txt"),
+        (LAYOUT.file("cameras", "train", 1), "camera_data/TRAIN/A/0001/cameras.json"),
+        (LAYOUT.file("depth", "val", 2, "left", 7), "depth/VAL/A/0002/left/0007.exr"),
         (
             LAYOUT.file("optical_flow", "train", 2, "left", 6, "into_future"),
             "optical_flow/TRAIN/A/0002/into_future/left/OpticalFlowIntoFuture_0006_L.pfm",

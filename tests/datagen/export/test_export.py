@@ -23,6 +23,7 @@ from datagen.formats import read_camera_data
 from datagen.sources.registry import open_source
 from datagen.verify.dataset_check import verify_dataset
 from scenes import sample_scene
+from scenes.spec import StereoCamera, Trajectory
 from stereoforge.cli import main
 from stereoforge_kit.files import open_tree
 
@@ -96,7 +97,7 @@ def test_kitti_disparities_at_the_ends_of_what_it_can_store() -> None:
 
 
 def test_a_laser_scanner_measures_few_pixels_in_even_lines(analytic_dataset: Path, tmp_path: Path) -> None:
-    mask = lidar_mask(375, 1242, 721.5, 64)
+    mask = lidar_mask(StereoCamera(1242, 375, 721.5 * 32 / 1242, 0.5, Trajectory.static()), 64)
     assert 0.03 < mask.mean() < 0.06
     assert not mask[:140].any()  # Nothing above the highest beam, 2 degrees over the horizon.
     middle = np.flatnonzero(mask.any(axis=0))
@@ -106,11 +107,11 @@ def test_a_laser_scanner_measures_few_pixels_in_even_lines(analytic_dataset: Pat
     # Beams are 26.9 / 63 degrees apart: 5.4 pixels at the horizon, more below it.
     assert np.diff(column)[:5].mean() == pytest.approx(5.4, abs=0.5)
     with pytest.raises(ValueError, match="at least one beam"):
-        lidar_mask(10, 10, 10.0, 0)
+        lidar_mask(StereoCamera(10, 10, 32.0, 0.5, Trajectory.static()), 0)
     export(analytic_dataset, "kitti", tmp_path, "--lidar-beams", "64")
     sparse = read_kitti(tmp_path / "training/disp_occ_0/000000_10.png")[1]
     sample = StereoDataset(analytic_dataset, "train")[0]
-    beams = lidar_mask(*sample.size, sample.scene_record.camera.focal_px, 64)
+    beams = lidar_mask(sample.scene_record.camera, 64)
     assert (sparse == beams & (sample.disparity_left > 0)).all()
 
 
@@ -153,11 +154,18 @@ def test_webdataset_shards_stream_the_same_bytes(analytic_dataset: Path, tmp_pat
         assert meta["baseline_m"] == frame.scene_record.camera.baseline_m
         poses = read_camera_data(layout.file("camera_data", "train", frame.scene))[frame.frame]
         np.testing.assert_array_equal([meta["poses"][view] for view in ("left", "right")], poses)
+        assert meta["cx_left"] == (meta["width"] - 1) / 2
+        for view, pose in zip(("left", "right"), poses, strict=True):
+            opencv = np.array(meta["cameras"][view]["camera_to_world"])
+            np.testing.assert_allclose(opencv, pose @ np.diag((1, -1, -1, 1)), atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", EXPORTERS)
 def test_a_damaged_data_set_is_not_exported(kind: str, own_dataset: Path, tmp_path: Path) -> None:
-    damaged = Layout(own_dataset).file("disparity", "train", 0, "left", 6)
+    if kind == "coco":
+        pytest.importorskip("pycocotools")
+    read = "object_index" if kind == "coco" else "disparity"
+    damaged = Layout(own_dataset).file(read, "train", 0, "left", 6)
     content = bytearray(damaged.read_bytes())
     content[len(content) // 2] ^= 1
     damaged.write_bytes(content)

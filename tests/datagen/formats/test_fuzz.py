@@ -15,19 +15,25 @@ import pytest
 from datagen.dataset.manifest import FileEntry, SceneManifest, read_manifest, write_manifest
 from datagen.errors import DatasetError
 from datagen.formats import (
+    cameras_record,
     read_camera_data,
+    read_cameras,
+    read_depth,
     read_flow,
     read_mask,
     read_occlusion,
     read_pfm,
     read_png,
     write_camera_data,
+    write_cameras,
+    write_depth,
     write_flow,
     write_mask,
     write_occlusion,
     write_pfm,
     write_png,
 )
+from scenes.spec import Rig, Trajectory
 
 RNG = np.random.default_rng(0)
 WRITERS: dict[str, tuple[Callable[[Path], None], Callable[[Path], Any]]] = {
@@ -45,6 +51,13 @@ WRITERS: dict[str, tuple[Callable[[Path], None], Callable[[Path], Any]]] = {
         lambda path: write_camera_data(path, {k: (np.eye(4), RNG.normal(size=(4, 4))) for k in (6, 7)}),
         read_camera_data,
     ),
+    "cameras": (
+        lambda path: write_cameras(
+            path, cameras_record(Rig(96, 64, 90, 91, 48, 49, 30, 0.2).camera(Trajectory.static()), {6: 0.0})
+        ),
+        read_cameras,
+    ),
+    "depth": (lambda path: write_depth(path, RNG.uniform(1, 90, (9, 7))), read_depth),
     "manifest": (
         lambda path: write_manifest(
             path, SceneManifest("f", "train", 3, "0" * 64, (FileEntry("a/b", 3, "a1" * 32),), {"x": 1.0})

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from datagen import DatasetError, Recipe, StereoDataset, StereoSample, render_dataset
 from datagen.dataset.layout import DIRECTIONS, EXTRA_TARGETS, VIEWS, Direction, Layout, View
 from datagen.dataset.manifest import file_entry, read_manifest, write_manifest
-from datagen.formats import write_flow, write_mask, write_normals, write_pfm, write_png
+from datagen.formats import write_depth, write_flow, write_mask, write_normals, write_pfm, write_png
 from datagen.gallery.page import write_gallery
 from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.scene_geometry import build_geometry
@@ -27,7 +27,7 @@ from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, Scene
 from scenes.motion.trajectories import quaternion
 from scenes.shapes.solids.basic import Plane
-from scenes.spec import Deformation, Material, SceneObject, StereoCamera, Trajectory
+from scenes.spec import Deformation, Material, Rig, SceneObject, Trajectory
 from scenes.textures.plain import SolidColor
 from tests.datagen.worlds import plates
 
@@ -81,12 +81,21 @@ PLANE_HALF_M = 3.0
 KINDS = {"rigid": np.zeros((3, 3)), "deforming": np.array(STRETCH)}
 
 
-def moving_plane(stretch: NDArray[np.float64]) -> Scene:
+CENTRED = Rig(WIDTH, HEIGHT, FOCAL_PX, FOCAL_PX, WIDTH / 2, WIDTH / 2, HEIGHT / 2, BASELINE_M)
+RIGS = {
+    "centred": CENTRED,
+    "somebody's": Rig(
+        WIDTH, HEIGHT, 1.1 * FOCAL_PX, 0.9 * FOCAL_PX, 0.46 * WIDTH, 0.55 * WIDTH, 0.57 * HEIGHT, BASELINE_M
+    ),
+}
+
+
+def moving_plane(stretch: NDArray[np.float64], rig: Rig = CENTRED) -> Scene:
     deformation = Stretch(tuple(map(tuple, stretch))) if stretch.any() else None
     thing = SceneObject(
         "plane", Plane(), 0, PLANE.trajectory(), (PLANE_HALF_M, PLANE_HALF_M, 1.0), deformation
     )
-    camera = StereoCamera(WIDTH, HEIGHT, 32.0, BASELINE_M, RIG.trajectory())
+    camera = rig.camera(RIG.trajectory())
     scene = plates(WIDTH, HEIGHT)
     return replace(
         scene, frames=3, camera=camera, objects=(thing,), materials=(Material(SolidColor((90, 90, 90))),)
@@ -99,14 +108,16 @@ class Expected:
     flow: NDArray[np.float64]
     disparity_change: NDArray[np.float64]
     normal: NDArray[np.float64]
+    depth: NDArray[np.float64]
 
 
-def closed_form(stretch: NDArray[np.float64], view: View, step: float, centre: float = 0.5) -> Expected:
+def closed_form(
+    stretch: NDArray[np.float64], view: View, step: float, centre: float = 0.5, rig: Rig = CENTRED
+) -> Expected:
     """Where the plane's points and the sky go from frame `NOW` on, from the motions' own formulas."""
     columns, rows = np.meshgrid(np.arange(WIDTH) + centre, np.arange(HEIGHT) + centre)
-    rays = np.stack(
-        [(columns - WIDTH / 2) / FOCAL_PX, (HEIGHT / 2 - rows) / FOCAL_PX, -np.ones_like(rows)], -1
-    )
+    cx = rig.cx_left if view == "left" else rig.cx_right
+    rays = np.stack([(columns - cx) / rig.fx, (rig.cy - rows) / rig.fy, -np.ones_like(rows)], -1)
     spans, middle = plane_seen(stretch, view, NOW)
     # The ray meets middle + u spans_x + v spans_y: three linear equations in (depth, u, v).
     system = np.concatenate([rays[..., None], np.broadcast_to(-spans, (*rays.shape[:2], 3, 2))], -1)
@@ -118,12 +129,12 @@ def closed_form(stretch: NDArray[np.float64], view: View, step: float, centre: f
     there = middle_then + np.stack([u, v], -1) @ spans_then.T
     camera_now, camera_then = RIG.at(NOW)[0], RIG.at(NOW + step)[0]
     there = np.where(hit[..., None], there, rays @ camera_now.T @ camera_then)
-    x = WIDTH / 2 + FOCAL_PX * there[..., 0] / -there[..., 2]
-    y = HEIGHT / 2 - FOCAL_PX * there[..., 1] / -there[..., 2]
-    change = np.where(hit, FOCAL_PX * BASELINE_M * (1 / -there[..., 2] - 1 / depth), 0.0)
+    x = cx + rig.fx * there[..., 0] / -there[..., 2]
+    y = rig.cy - rig.fy * there[..., 1] / -there[..., 2]
+    change = np.where(hit, rig.fx * BASELINE_M * (1 / -there[..., 2] - 1 / depth), 0.0)
     normal = np.cross(spans[:, 0], spans[:, 1])
     normal *= -np.sign(normal @ middle) / np.linalg.norm(normal)
-    return Expected(hit, np.stack([x - columns, y - rows], -1), change, normal)
+    return Expected(hit, np.stack([x - columns, y - rows], -1), change, normal, np.where(hit, depth, np.inf))
 
 
 def plane_seen(
@@ -146,11 +157,13 @@ def surfaces(scene: Scene, view: View, time: float = NOW) -> PixelSurfaces:
 @pytest.mark.parametrize("direction", DIRECTIONS)
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("lens", RIGS)
 def test_flow_disparity_change_and_normals_have_their_closed_form(
-    kind: str, view: View, direction: Direction
+    kind: str, view: View, direction: Direction, lens: str
 ) -> None:
-    stretch = KINDS[kind]
-    found, expected = surfaces(moving_plane(stretch), view), closed_form(stretch, view, STEP[direction])
+    stretch, rig = KINDS[kind], RIGS[lens]
+    found = surfaces(moving_plane(stretch, rig), view)
+    expected = closed_form(stretch, view, STEP[direction], rig=rig)
     assert 0.3 < expected.hit.mean() < 0.95
     # Pixels on the plane's rim may fall to either side.
     rim = np.zeros_like(expected.hit)
@@ -165,14 +178,19 @@ def test_flow_disparity_change_and_normals_have_their_closed_form(
     assert np.abs(found.disparity_change(direction) - expected.disparity_change)[~rim].max() < TOLERANCE_PX
     normals = found.normals()[expected.hit & ~rim]
     assert np.abs(normals - expected.normal).max() < 1e-5
+    hits = SceneRayCaster(build_geometry(moving_plane(stretch, rig))).cast_all(view, NOW)
+    made = ExtraTargets(SceneRayCaster(found.geometry), ("depth",)).make(
+        view, 0, hits.object_index, hits.disparity
+    )
+    np.testing.assert_allclose(made["depth", None][~rim], expected.depth[~rim], rtol=1e-5)
     # What would be wrong: half a pixel, the sign, the direction, the other view, a forgotten deformation.
     other_view: View = "right" if view == "left" else "left"
     wrong = {
-        "half a pixel": closed_form(stretch, view, STEP[direction], centre=0.0).flow,
+        "half a pixel": closed_form(stretch, view, STEP[direction], 0.0, rig).flow,
         "sign": -expected.flow,
-        "direction": closed_form(stretch, view, -STEP[direction]).flow,
-        "view": closed_form(stretch, other_view, STEP[direction]).flow,
-        "shape": closed_form(0.5 * stretch + 0.01, view, STEP[direction]).flow,
+        "direction": closed_form(stretch, view, -STEP[direction], rig=rig).flow,
+        "view": closed_form(stretch, other_view, STEP[direction], rig=rig).flow,
+        "shape": closed_form(0.5 * stretch + 0.01, view, STEP[direction], rig=rig).flow,
     }
     for name, other in wrong.items():
         assert np.percentile(np.linalg.norm(flow - other, axis=-1)[~rim], 50) > TOLERANCE_PX, name
@@ -190,8 +208,8 @@ def test_only_what_was_asked_for_is_made(kinds: tuple[str, ...], monkeypatch: py
 
     monkeypatch.setattr(PixelSurfaces, "flow", counted)
     caster = SceneRayCaster(build_geometry(moving_plane(KINDS["rigid"])))
-    index = caster.cast_all("left", NOW).object_index
-    made = ExtraTargets(caster, kinds).make("left", NOW, index)
+    hits = caster.cast_all("left", NOW)
+    made = ExtraTargets(caster, kinds).make("left", NOW, hits.object_index, hits.disparity)
     assert {kind for kind, _ in made} == set(kinds)
     assert followed == (list(DIRECTIONS) if {"optical_flow", "motion_boundaries"} & set(kinds) else [])
 
@@ -321,6 +339,8 @@ def test_verify_finds_targets_that_are_not_of_the_scene(dataset: Path, tmp_path:
     mistakes: list[tuple[str, Direction | None, Callable[[Path, Any], None], Any]] = [
         ("material_index", None, write_png, sample.material_index("right")),
         ("normals", None, write_normals, turned),
+        ("depth", None, write_depth, sample.depth("left") * np.float32(1.001)),
+        ("depth", None, write_depth, np.minimum(sample.depth("left"), np.float32(1e4))),
         ("optical_flow", "into_future", write_flow, sample.flow("left", "into_future") + np.float32(0.5)),
         ("optical_flow", "into_past", write_flow, -sample.flow("left", "into_past")),
         ("disparity_change", "into_future", write_pfm, sample.disparity_change("left", "into_past")),
@@ -380,7 +400,7 @@ def test_targets_are_read_and_what_follows_from_others_compared_without_rays_too
 ) -> None:
     root = Path(shutil.copytree(dataset, tmp_path / "set"))
     layout, sample = Layout(root), StereoDataset(root, "train")[0]
-    direction: Direction | None = None if kind in ("material_index", "normals") else "into_past"
+    direction: Direction | None = None if kind in ("depth", "material_index", "normals") else "into_past"
     path = layout.file(kind, "train", 0, "left", sample.frame, direction)
     if kind == "material_index":
         write_png(path, sample.material_index("left") + np.uint16(1))
@@ -419,7 +439,7 @@ def test_flow_loaders_find_the_published_names(dataset: Path) -> None:
 
 def test_unknown_targets_are_refused() -> None:
     world = FAMILIES["flying_things"].config()
-    with pytest.raises(DatasetError, match=r"targets must be among material_index.*'albedo'"):
+    with pytest.raises(DatasetError, match=r"targets must be among depth, material_index.*'albedo'"):
         Recipe(world, {"train": 1}, targets=("albedo",))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -38,7 +39,7 @@ def test_a_right_data_set_has_no_problem(analytic_dataset: Path) -> None:
     report = verify_dataset(analytic_dataset, progress=lambda done, total: calls.append((done, total)))
     assert [str(problem) for problem in report.problems] == []
     assert report.ok
-    assert (report.scenes, report.frames, report.files) == (3, 6, 3 * (2 * 2 * 5 + 2))
+    assert (report.scenes, report.frames, report.files) == (3, 6, 3 * (2 * 2 * 5 + 3))
     listed = [
         entry.size
         for split, scene in (("train", 0), ("train", 1), ("test", 0))
@@ -103,7 +104,7 @@ def test_a_scene_without_manifest_is_missing_and_its_files_belong_to_nothing(own
     found = messages(verify_dataset(own_dataset)).splitlines()
     assert "recipe.yaml: 1 of the recipe's 2 train scenes are not finished (0)" in found
     orphans = [line for line in found if line.endswith("belongs to no finished scene")]
-    assert len(orphans) == 2 * 2 * 5 + 2
+    assert len(orphans) == 2 * 2 * 5 + 3
     assert len(found) == len(orphans) + 1
 
 
@@ -285,6 +286,22 @@ def test_poses_against_the_scene(own_dataset: Path) -> None:
     path.write_text("Frame 6\n")
     commit_again(own_dataset)
     assert "camera data has three lines a frame" in messages(verify_dataset(own_dataset))
+
+
+@pytest.mark.parametrize("at", ["fx", "baseline_m", "frames"])
+def test_cameras_against_the_scene(at: str, own_dataset: Path) -> None:
+    path = Layout(own_dataset).file("cameras", "train", 0)
+    record = json.loads(path.read_text())
+    if at == "frames":
+        record["frames"]["7"]["right"]["world_to_camera"][0][3] += 1e-6
+    else:
+        record[at] *= 1.0001
+    path.write_text(json.dumps(record))
+    commit_again(own_dataset)
+    assert "its numbers are not those of the scene's camera" in messages(verify_dataset(own_dataset))
+    path.write_text("[")
+    commit_again(own_dataset)
+    assert "cameras.json: is no JSON" in messages(verify_dataset(own_dataset))
 
 
 def test_a_file_the_manifest_forgot_and_a_scene_that_does_not_parse(own_dataset: Path) -> None:

@@ -78,7 +78,8 @@ def test_streets_have_what_streets_have() -> None:
         assert seen[kind] >= 2, kind
     focal = {scene.camera.focal_mm for scene in scenes}
     speeds = np.array([scene.notes["speed_m"] for scene in scenes])
-    assert focal == {15.0, 35.0}
+    assert len(focal) >= 4
+    assert focal <= set(DrivingConfig().focal_lengths_mm)
     assert (speeds > 0).any()
     assert (speeds < 0).any()
     assert (np.abs(speeds) < 0.51).any()

@@ -139,10 +139,21 @@ def test_everything_scales_with_the_baseline() -> None:
     assert np.mean(np.abs(wide - narrow) > 1e-4) < 0.01
 
 
-def test_the_default_rig_is_that_of_flying_things_3d() -> None:
-    camera = sampled(0, FlyingThingsConfig()).camera
+def test_the_published_rig_is_that_of_flying_things_3d() -> None:
+    camera = sampled(0, FlyingThingsConfig(focal_mm=(35.0, 35.0), baseline_m=(1.0, 1.0))).camera
     assert (camera.width, camera.height) == (960, 540)
     assert camera.disparity_metres == 1050.0
+
+
+def test_lenses_and_baselines_are_wide_by_default() -> None:
+    """Fields of view from 30 to 80 degrees, and baselines from a phone's to a car's."""
+    cameras = [sampled(seed, SMALL).camera for seed in range(12)]
+    fields = [2 * np.degrees(np.arctan2(camera.width / 2, camera.focal_px)) for camera in cameras]
+    assert 29 < min(fields) < 40
+    assert 60 < max(fields) < 84
+    baselines = [camera.baseline_m for camera in cameras]
+    assert min(baselines) < 0.3
+    assert max(baselines) > 0.7
 
 
 def test_the_same_seed_gives_the_same_scene() -> None:

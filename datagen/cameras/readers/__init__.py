@@ -1,0 +1,1 @@
+"""Formats of calibrations, one module each with a `READER`."""
