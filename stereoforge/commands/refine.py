@@ -1,25 +1,26 @@
-"""`stereoforge refine`: one pair of pictures to a refined disparity."""
+"""`stereoforge refine`: pairs of pictures to refined disparities."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from stereoforge.bundled_weights import BUNDLED_WEIGHTS, named_weights
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import check_max_disparity, shown
 from stereoforge.inputs.images import pair_doubts, read_color_images
+from stereoforge.inputs.picture_pairs import PicturePair, find_pairs
+from stereoforge.inputs.results_folder import claim_results
 from stereoforge.places import keep_apart
-from stereoforge.progress import console
+from stereoforge.progress import console, progress_bar
 
 if TYPE_CHECKING:
-    from refine.mrf.solve import MRFSolution
-    from training.prediction.predictor import Prediction
+    from stereoforge.pipelines.refiner import RefinedPair, StereoRefiner
 
 WRITTEN = (
     "disparity.pfm",
@@ -46,17 +47,20 @@ BEYOND_INFINITY = 0.01
 
 @dataclass(frozen=True)
 class Refine:
-    """Predict disparity, confidence and gradients of a rectified pair, and refine the disparity with the MRF.
+    """Predict disparity, confidence and gradients of rectified pairs, and refine the disparity with the MRF.
 
     With --disparity or --predictor sgbm the disparity comes from another predictor; the run folder's confnet_free and
     gradnet_free judge it, or, without them, consistency and texture. Writes disparity.pfm, disparity_initial.pfm,
-    confidence.pfm, gradient.exr and overview.png.
+    confidence.pfm, gradient.exr and overview.png; of two folders, into a folder for each pair. Run it again to continue
+    where it stopped.
     """
 
+    interrupted: ClassVar[str] = "the same command run again continues where it stopped"
+
     left: Annotated[tyro.conf.Positional[Path], shown("LEFT")]
-    """Left picture (PNG, JPEG, TIFF, ...)."""
+    """Left picture (PNG, JPEG, TIFF, ...), or a folder of them."""
     right: Annotated[tyro.conf.Positional[Path], shown("RIGHT")]
-    """Right picture, rectified and of the same size."""
+    """Right picture, rectified and of the same size, or the folder of the right pictures."""
     out: Annotated[Path, shown("DIR")]
     """Folder for the results."""
     weights: Annotated[Path, shown("RUN", "the bundled weights")] = BUNDLED_WEIGHTS
@@ -83,51 +87,78 @@ class Refine:
     """What the networks run on: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
     def run(self) -> None:
-        """Refine the pair and write every output into the folder."""
+        """Refine every pair and write its results."""
         self._check()
-        run = named_weights(self.weights)
-        left, right, remarks = read_color_images(self.left, self.right)
-        remarks += (odd := pair_doubts(left, right))
-        from stereoforge.inputs.disparity_files import read_disparity
-        from stereoforge.pipelines.prediction import open_settings, predict_pair
+        found = find_pairs(self.left, self.right)
+        if len(found.pairs) > 1 and self.disparity is not None:
+            raise UsageError("--disparity is of one pair; give two pictures")
+        from stereoforge.pipelines.refiner import StereoRefiner
 
-        given = None
-        if self.disparity is not None:
-            size = (left.shape[0], left.shape[1])
-            disparity, said = read_disparity(self.disparity, size)
-            other = None
-            remarks += said
-            if self.disparity_right is not None:
-                other, said = read_disparity(self.disparity_right, size)
-                remarks += said
-            given = disparity, other
-        predictor: Literal["networks", "sgbm"] = "sgbm" if given is not None else self.predictor
-        settings = open_settings(self.parameters, run, predictor)
-        method = settings.ours
-        if self.form is not None:
-            method = replace(settings.ours_quadratic, form=self.form)
-        prediction, notes = predict_pair(
-            left, right, given, run, self.device, self.predictor, self.max_disparity
+        refiner = StereoRefiner(
+            self.weights,
+            predictor="networks" if self.disparity is None and self.predictor == "networks" else "sgbm",
+            parameters=self.parameters,
+            form=self.form,
+            max_disparity=self.max_disparity,
+            device=self.device,
         )
-        assert prediction.confidence is not None
-        assert prediction.gradient is not None
-        with console.status("refining; the first time after an install this compiles for a minute"):
-            solution = method.solve(prediction.disparity, prediction.confidence, prediction.gradient, left)
-        deviation = None
-        if self.deviation:
-            deviation = method.sample(
-                prediction.disparity, prediction.confidence, prediction.gradient, left, POSTERIOR_SAMPLES
-            )
-        self._write(left, prediction, solution, deviation)
-        doubts = [] if odd else _doubtful_views(left, right)
-        doubts += _doubts(None if given is None else given[0], prediction.confidence)
-        for note in (*remarks, *notes, *doubts, *_doubtful_result(solution.disparity)):
-            console.print(note, markup=False)
+        for note in (found.note, *refiner.notes):
+            if note:
+                console.print(note, markup=False)
+        if not found.pairs[0].name:
+            with console.status("refining; the first time after an install this compiles for a minute"):
+                said = self._refine(refiner, found.pairs[0])
+            for line in said:
+                console.print(line, markup=False)
+            return
+        self._refine_all(refiner, found.pairs)
+
+    def _refine_all(self, refiner: StereoRefiner, pairs: tuple[PicturePair, ...]) -> None:
+        """Refine the pairs of two folders but for those that are there already."""
+        claim_results(self.out, {**refiner.settings, "deviation": self.deviation}, "--out")
+        left = [pair for pair in pairs if not (self.out / pair.name / WRITTEN[-1]).is_file()]
+        with progress_bar() as progress:
+            task = progress.add_task("refining", total=len(pairs), completed=len(pairs) - len(left))
+            for pair in left:
+                for line in self._refine(refiner, pair)[:-1]:
+                    console.print(f"{pair.name}: {line}", markup=False)
+                progress.advance(task)
         console.print(
-            f"{self.out}: disparity {solution.disparity.min():.1f} to {solution.disparity.max():.1f} px, refined in "
-            f"{solution.info.seconds:.2f} s ({solution.info.solver}); look at {self.out / 'overview.png'}",
+            f"{self.out}: {len(left)} pairs refined, {len(pairs) - len(left)} were there already",
             markup=False,
         )
+
+    def _refine(self, refiner: StereoRefiner, pair: PicturePair) -> list[str]:
+        """Refine one pair, write its results, and return what is to be said of it, the result last."""
+        left, right, remarks = read_color_images(pair.left, pair.right)
+        remarks += (odd := pair_doubts(left, right))
+        from stereoforge.inputs.disparity_files import read_disparity
+
+        size = (left.shape[0], left.shape[1])
+        given: list[NDArray[np.float32] | None] = []
+        for path in (self.disparity, self.disparity_right):
+            disparity, said = (None, []) if path is None else read_disparity(path, size)
+            given.append(disparity)
+            remarks += said
+        refined = refiner(
+            left,
+            right,
+            disparity=given[0],
+            disparity_right=given[1],
+            deviation_samples=POSTERIOR_SAMPLES if self.deviation else 0,
+        )
+        out = self.out / pair.name
+        self._write(out, left, refined)
+        doubts = [] if odd else _doubtful_views(left, right)
+        doubts += _doubts(given[0], refined.confidence)
+        disparity = refined.disparity
+        return [
+            *remarks,
+            *doubts,
+            *_doubtful_result(disparity),
+            f"{out}: disparity {disparity.min():.1f} to {disparity.max():.1f} px, refined in "
+            f"{refined.info.seconds:.2f} s ({refined.info.solver}); look at {out / WRITTEN[-1]}",
+        ]
 
     def _check(self) -> None:
         check_max_disparity(self.max_disparity)
@@ -137,36 +168,32 @@ class Refine:
             raise UsageError("--disparity-right goes with --disparity")
         if self.out.exists() and not self.out.is_dir():
             raise UsageError(f"--out {self.out}: is a file, not a folder")
+        for flag, read in (("LEFT", self.left), ("RIGHT", self.right)):
+            if read.is_dir():
+                keep_apart("--out", self.out, flag, read)
         for name in WRITTEN:
             keep_apart("--out", self.out / name, "LEFT", self.left)
             keep_apart("--out", self.out / name, "RIGHT", self.right)
             keep_apart("--out", self.out / name, "--disparity", self.disparity)
             keep_apart("--out", self.out / name, "--disparity-right", self.disparity_right)
 
-    def _write(
-        self,
-        left: NDArray[np.uint8],
-        prediction: Prediction,
-        solution: MRFSolution,
-        deviation: NDArray[np.float32] | None,
-    ) -> None:
+    def _write(self, out: Path, left: NDArray[np.uint8], refined: RefinedPair) -> None:
         from datagen.formats import write_gradient, write_pfm, write_png
         from datagen.ground_truth.labels import gradient_validity
         from refine.report.overview import overview_picture
 
-        refined = solution.disparity.astype("float32")
-        assert prediction.confidence is not None
-        assert prediction.gradient is not None
         # A slope is predicted everywhere; only the differences inside the image exist.
-        inside = gradient_validity(prediction.gradient, float("inf"))
-        write_pfm(self.out / "disparity.pfm", refined)
-        write_pfm(self.out / "disparity_initial.pfm", prediction.disparity)
-        write_pfm(self.out / "confidence.pfm", prediction.confidence)
-        if deviation is not None:
-            write_pfm(self.out / "deviation.pfm", deviation)
-        write_gradient(self.out / "gradient.exr", prediction.gradient, inside)
-        picture = overview_picture(left, prediction.disparity, prediction.confidence, refined, deviation)
-        write_png(self.out / "overview.png", picture)
+        inside = gradient_validity(refined.gradient, float("inf"))
+        write_pfm(out / "disparity.pfm", refined.disparity)
+        write_pfm(out / "disparity_initial.pfm", refined.initial)
+        write_pfm(out / "confidence.pfm", refined.confidence)
+        if refined.deviation is not None:
+            write_pfm(out / "deviation.pfm", refined.deviation)
+        write_gradient(out / "gradient.exr", refined.gradient, inside)
+        picture = overview_picture(
+            left, refined.initial, refined.confidence, refined.disparity, refined.deviation
+        )
+        write_png(out / WRITTEN[-1], picture)
 
 
 def _doubts(given: NDArray[np.float32] | None, confidence: NDArray[np.float32]) -> list[str]:
@@ -196,7 +223,7 @@ def _doubtful_views(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> list[s
     return ["more of the pair can be matched the other way round: is the first picture the left one?"]
 
 
-def _doubtful_result(disparity: NDArray[np.float64]) -> list[str]:
+def _doubtful_result(disparity: NDArray[np.float32]) -> list[str]:
     share = float((disparity < BEYOND_INFINITY_PX).mean())
     if share < BEYOND_INFINITY:
         return []

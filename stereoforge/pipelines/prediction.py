@@ -19,7 +19,6 @@ from refine.evaluation.settings import Settings, read_settings
 from refine.forest import Forest, load_forest
 from refine.heuristic_inputs import consistency_confidence, local_gradients
 from refine.method import Method
-from stereoforge.errors import CommandError
 from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
 from training.prediction.predictor import Prediction, RegressorFreePredictor, StereoPredictor
 from training.runs.weights import has_weights, weights_path
@@ -274,43 +273,6 @@ def untrained_notes(lacking: Mapping[str, Sequence[str]], run: Path, predictor: 
             reason, remedy = "semi-global matching has no fine-tuned counterpart", ""
         notes.append(f"{reason}, so {', '.join(methods)} cannot run{remedy}")
     return notes
-
-
-def predict_pair(
-    left: Image,
-    right: Image,
-    given: tuple[Map, Map | None] | None,
-    run: Path,
-    device: str,
-    predictor: PredictorName,
-    max_disparity: int | None = None,
-) -> tuple[Prediction, list[str]]:
-    """The inputs of refining one pair, and a sentence for each input that had to be replaced.
-
-    Args:
-        given: The left view's disparity and perhaps the right view's, instead of a predictor.
-        max_disparity: Largest disparity in pixels that the predictor looks for; None leaves it to the predictor.
-
-    Raises:
-        CommandError: The run folder lacks a network.
-        TrainingError: Anything wrong with the run folder, or with the images.
-    """
-    if given is not None or predictor == "sgbm":
-        if left.shape != right.shape:
-            raise CommandError(
-                f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
-                f"right {right.shape[1]}x{right.shape[0]}"
-            )
-        matching = open_matching(run, device, max_disparity)
-        answer = matching.predict(left, right) if given is None else matching.predict_for(left, right, *given)
-        return answer, fallback_notes(run)
-    answer = open_regressor(run, device, max_disparity).predict(left, right)
-    for name, found in zip(HEADS, (answer.confidence, answer.gradient), strict=True):
-        if found is None:
-            raise CommandError(
-                f"{run}: has no {name}, which refining needs: {train_command(name, run)} makes one"
-            )
-    return answer, []
 
 
 def parameters_file(run: Path, predictor: PredictorName = "networks") -> Path:

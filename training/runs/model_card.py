@@ -91,3 +91,6 @@ def _describe(summary: TrainingSummary) -> Iterator[str]:
     if not summary.validation:
         yield "| validation | none: the last weights are kept |"
     yield f"| code | {summary.revision} |"
+    if summary.started_from is not None:
+        yield from ("", "It started from weights that were trained so:", "")
+        yield from _describe(summary.started_from)

@@ -97,7 +97,17 @@ def _summary_of(plan: RunPlan, sources: Sequence[Source]) -> TrainingSummary:
         best_step=0,
         fingerprints=tuple(source.fingerprint for source in sources),
         revision=code_revision(),
+        started_from=_start_of(plan.request),
     )
+
+
+def _start_of(request: TrainingRequest) -> TrainingSummary | None:
+    """How the regressor was trained that a regressor starts from."""
+    if request.task not in ("regressor", "regressor_f"):
+        return None
+    if request.task == "regressor" and request.init is None:
+        return None
+    return read_summary(request.init or request.out, "regressor")
 
 
 def _remarks(plan: RunPlan, module: StereoDataModule, continued: Continuation | None) -> list[str]:

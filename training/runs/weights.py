@@ -53,6 +53,8 @@ class TrainingSummary:
     """What identifies each data set's frames (`training.data.fingerprint`)."""
     revision: str = ""
     """Version and git revision of the code."""
+    started_from: TrainingSummary | None = None
+    """How the regressor was trained that a `regressor` or `regressor_f` started from; None for new weights."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import pytest
 import torch
 import torch.nn.functional as F  # noqa: N812
 
-from stereoforge.bundled_weights import BUNDLED_WEIGHTS
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS, PAPER_WEIGHTS
 from tests.training.prediction.test_predictor import edit_description, save_run
 from training.errors import TrainingError
 from training.networks import ConfNet, Correlation1D
@@ -54,10 +54,15 @@ def test_onnx_says_what_the_predictor_says(network: str, heads: bool, tmp_path: 
         np.testing.assert_allclose(answers[2][0].transpose(1, 2, 0), expected.gradient, atol=1e-3)
 
 
-def test_the_shipped_networks_can_be_exported(tmp_path: Path) -> None:
-    """Their heads see more than the regressor's features."""
-    exported = export_model(BUNDLED_WEIGHTS, tmp_path)
-    assert exported.outputs == ("disparity", "confidence", "gradient")
+@pytest.mark.parametrize(
+    ("weights", "outputs"),
+    [(BUNDLED_WEIGHTS, ("disparity",)), (PAPER_WEIGHTS, ("disparity", "confidence", "gradient"))],
+)
+def test_the_shipped_networks_can_be_exported(
+    weights: Path, outputs: tuple[str, ...], tmp_path: Path
+) -> None:
+    """The paper's heads see more than the regressor's features."""
+    assert export_model(weights, tmp_path).outputs == outputs
 
 
 def test_what_onnx_cannot_express_is_a_sentence_and_leaves_nothing(

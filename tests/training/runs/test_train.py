@@ -330,6 +330,16 @@ def test_the_card_names_data_steps_figures_and_code(data: Path, run: Path) -> No
     assert summary.revision in card
 
 
+def test_the_card_names_what_a_regressor_started_from(data: Path, run: Path, tmp_path: Path) -> None:
+    first = read_summary(run, "regressor")
+    assert first.started_from is None
+    train_quietly("regressor", [(data, 2.0)], tmp_path, quick_regressor(), init=run, steps=2)
+    assert read_summary(tmp_path, "regressor").started_from == first
+    card = (tmp_path / "model_card.md").read_text()
+    assert "| data, weight 2 |" in card.split("It started from weights that were trained so:")[0]
+    assert "| data, weight 1 |" in card.split("It started from weights that were trained so:")[1]
+
+
 def test_a_moving_average_is_what_is_kept(data: Path, tmp_path: Path) -> None:
     """With a decay of 0.5 the kept weights are the average of those of every step, half the weight each time."""
     steps: list[torch.Tensor] = []

@@ -1,0 +1,85 @@
+"""Find the pairs of pictures that the user names: two files, or two folders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from stereoforge.errors import UsageError
+
+PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm")
+"""Endings of the pictures in a folder."""
+
+
+@dataclass(frozen=True)
+class PicturePair:
+    """Two files."""
+
+    name: str
+    """The folder of its results in --out; empty for the only pair, whose results lie in --out itself."""
+    left: Path
+    right: Path
+
+
+@dataclass(frozen=True)
+class PicturePairs:
+    """All pairs, and how they were found."""
+
+    pairs: tuple[PicturePair, ...]
+    note: str | None = None
+    """What the user should know of how pictures were matched to one another."""
+
+
+def find_pairs(left: Path, right: Path) -> PicturePairs:
+    """The pairs of two pictures, or of two folders of pictures.
+
+    Pictures of two folders are paired by their names. Where the names differ, as in left_01.png and right_01.png, they
+    are paired in the order of their names.
+
+    Raises:
+        UsageError: a folder beside a picture, a folder without pictures, or folders with different numbers of them.
+    """
+    if not left.is_dir() and not right.is_dir():
+        return PicturePairs((PicturePair("", left, right),))
+    for folder, other in ((left, right), (right, left)):
+        if not folder.is_dir():
+            raise UsageError(f"{folder}: is no folder, and {other} is one; give two pictures or two folders")
+    views = _pictures(left), _pictures(right)
+    if len(views[0]) != len(views[1]):
+        raise UsageError(
+            f"{len(views[0])} left and {len(views[1])} right pictures{_without_partner(*views)}; each needs its partner"
+        )
+    pairs = tuple(PicturePair(one.stem, one, other) for one, other in zip(*views, strict=True))
+    names = [pair.name for pair in pairs]
+    if len(set(names)) != len(names):
+        raise UsageError(f"{left}: two pictures have the same name but for their endings")
+    if names == [pair.right.stem for pair in pairs]:
+        return PicturePairs(pairs)
+    first = pairs[0]
+    return PicturePairs(
+        pairs, f"paired in the order of their names, such as {first.left.name} and {first.right.name}"
+    )
+
+
+def _pictures(folder: Path) -> list[Path]:
+    """The pictures of a folder by their names, without hidden files."""
+    found = sorted(
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() in PICTURES and not path.name.startswith(".") and path.is_file()
+    )
+    if not found:
+        raise UsageError(f"{folder}: holds no pictures ({', '.join(PICTURES)})")
+    return found
+
+
+def _without_partner(left: list[Path], right: list[Path]) -> str:
+    """The first picture whose name the other folder does not have, where most have one."""
+    names = {path.stem for path in left}, {path.stem for path in right}
+    if 2 * len(names[0] & names[1]) < len(names[0]):
+        return ""
+    for paths, others in ((left, names[1]), (right, names[0])):
+        for path in paths:
+            if path.stem not in others:
+                return f" ({path} has none)"
+    return ""
