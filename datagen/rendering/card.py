@@ -56,7 +56,7 @@ class Card:
 
     text: str
     picture: NDArray[np.uint8] | None
-    """(H, W, 3) sRGB: left view, right view and disparity of a few scenes; None if none of them can be read."""
+    """(H, W, 3) sRGB: left view, right view and disparity of a few scenes; None if one of them is damaged."""
 
 
 def update_card(tree: Tree, area: StagingArea) -> None:
@@ -94,7 +94,7 @@ def compose_card(tree: Tree) -> Card:
         picture = _picture(layout, recipe, scenes)
     notes = tree.read(LICENSES).decode("utf-8", "replace") if tree.exists(LICENSES) else None
     sections = (
-        _lead(recipe, scenes, picture is not None),
+        _lead(recipe, scenes),
         _contents(recipe, scenes),
         _statistics(manifests),
         _recipe(recipe, manifests),
@@ -148,23 +148,23 @@ def _picture(layout: Layout, recipe: Recipe, scenes: dict[str, list[int]]) -> ND
     first = [(split, scene) for split in SPLITS for scene in scenes[split]][:SHOWN_SCENES]
     for split, scene in first:
         sample = StereoSample(layout, split, scene, FIRST_FRAME, recipe.passes[0])
-        with suppress(DatasetError):
+        try:
             nearest = max(float(np.percentile(sample.disparity_left, 99.5)), 1.0)
             pictures = (sample.left, sample.right, disparity_picture(sample.disparity_left, nearest))
-            rows.append(side_by_side([shrunk(picture, TILE_PX) for picture in pictures]))
+        except DatasetError:
+            return None  # The picture that is there may be of that scene before it was damaged.
+        rows.append(side_by_side([shrunk(picture, TILE_PX) for picture in pictures]))
     return stacked(rows) if rows else None
 
 
-def _lead(recipe: Recipe, scenes: dict[str, list[int]], has_picture: bool) -> str:
+def _lead(recipe: Recipe, scenes: dict[str, list[int]]) -> str:
     world = recipe.world
     pairs = sum(map(len, scenes.values())) * world.frames
     about = inspect.getdoc(inspect.getmodule(FAMILIES[recipe.family].sample)) or ""
-    picture = (
-        f"\n![left view, right view and disparity of the first scenes]({PICTURE})\n" if has_picture else ""
-    )
     return (
         f"# {recipe.family}, {world.width} x {world.height}: {pairs} stereo pairs with exact ground truth\n"
-        f"{picture}\n{' '.join(about.split())}\n\n"
+        f"\n![left view, right view and disparity of the first scenes]({PICTURE})\n"
+        f"\n{' '.join(about.split())}\n\n"
         "Rendered by StereoForge. Disparity, its gradient, occlusion and object indices of both views were computed "
         "from the scenes' geometry at the pixels' centres; they are not estimates.\n"
     )

@@ -48,7 +48,7 @@ def test_a_set_has_the_histogram_asked_for(recipe: Recipe) -> None:
     assert WANTED.missed(seen) < 0.12
     np.testing.assert_allclose(found, WANTED.shares, atol=0.1)
     usual = replace(recipe, disparities=None, scenes={"train": 6})
-    assert WANTED.missed(surfaces(usual)) > 0.3
+    assert WANTED.missed(surfaces(usual)) > 0.2
 
 
 def test_the_recipe_keeps_what_was_found_and_others_are_written_as_before(recipe: Recipe) -> None:
