@@ -11,7 +11,7 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -24,19 +24,16 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import SPLITS
 from datagen.dataset.shards import cache_folder
 from datagen.errors import DatasetError, MachineError
 from datagen.executors import LocalExecutor, WorkerPolicy
 from datagen.formats.picture import read_picture
 from scenes.geometry.building import solid
-from scenes.user_assets.pool import Asset, AssetPool
+from scenes.user_assets.pool import Asset, AssetPool, spread_over_splits
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import replacing, temporary_folder, walk_files
 from stereoforge_kit.processes import Limits, available_memory_bytes
 
-ASSET_KINDS = ("meshes", "textures", "environments")
-"""The fields of `AssetPool` that hold files, named as their flags are."""
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
 TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 ENVIRONMENT_SUFFIXES = (".hdr", ".exr")
@@ -86,6 +83,7 @@ def import_assets(
     textures: Path | None = None,
     environments: Path | None = None,
     up_axis: UpAxis = "auto",
+    known: AssetPool | None = None,
     progress: ImportProgress | None = None,
 ) -> ImportedAssets:
     """Prepare all usable files below the given folders into `store`, as many at a time as there are cores.
@@ -99,6 +97,7 @@ def import_assets(
         textures: A folder of PNG, JPEG, TIFF, WebP and BMP files.
         environments: A folder of equirectangular Radiance HDR and OpenEXR files.
         up_axis: Which axis of the meshes points up, "y" or "z"; "auto" for what is usual in their format (`Y_UP`).
+        known: A pool whose files keep their splits, as a data set's that already shows some of them.
         progress: Called with how many files of a kind are done, how many there are, and the kind.
 
     Raises:
@@ -119,7 +118,8 @@ def import_assets(
             continue
         report = None if progress is None else partial(progress, kind)
         work = _FolderImport(suffixes, prepare, limits, store, partial(_identity, up_axis), report)
-        kinds.append(work.run(folder, skipped, remarks))
+        decided = () if known is None else getattr(known, kind)
+        kinds.append(spread_over_splits(work.run(folder, skipped, remarks), decided))
     pool = AssetPool(meshes=kinds[0], textures=kinds[1], environments=kinds[2])
     return ImportedAssets(pool, tuple(skipped), tuple(remarks))
 
@@ -141,34 +141,11 @@ def prepared_assets_folder() -> Iterator[Path]:
 def copy_prepared(pool: AssetPool, store: Path, target: Path) -> None:
     """Copy the prepared files of a pool from one store to another, each whole or not at all, unless they are there."""
     target.mkdir(parents=True, exist_ok=True)
-    for asset in (*pool.meshes, *pool.textures, *pool.environments):
+    for asset in pool.files:
         name = f"{asset.sha256}.npz"
         if not is_zipfile(target / name):
             with replacing(target / name) as temporary:
                 shutil.copyfile(store / name, temporary)
-
-
-def describe_splits(pool: AssetPool) -> list[str]:
-    """A sentence for each kind of user assets that there are: how many files each split has."""
-    sentences = []
-    for name in ASSET_KINDS:
-        if files := getattr(pool, name):
-            counts = [f"{len(getattr(pool.of_split(split), name))} {split}" for split in SPLITS]
-            sentences.append(f"{name}: {len(files)} files, {', '.join(counts)}")
-    return sentences
-
-
-def require_assets(pool: AssetPool, splits: Iterable[str]) -> None:
-    """Raise DatasetError for a split without any file of a kind that there are files of."""
-    for split in splits:
-        of_split = pool.of_split(split)
-        for name in ASSET_KINDS:
-            files = getattr(pool, name)
-            if files and not getattr(of_split, name):
-                raise DatasetError(
-                    f"split {split} has none of the {len(files)} files of --{name}, each of which is used in one split "
-                    "only; with three files or more every split has some"
-                )
 
 
 def _identity(up_axis: UpAxis, path: Path) -> bytes:
@@ -194,8 +171,11 @@ class _FolderImport:
     identity: Callable[[Path], bytes] = lambda _: b""
     report: Callable[[int, int], None] | None = None
 
-    def run(self, folder: Path, skipped: list[str], remarks: list[str]) -> tuple[Asset, ...]:
-        """The usable files of a folder, all in the store. Raises DatasetError if it has none, and MachineError."""
+    def run(self, folder: Path, skipped: list[str], remarks: list[str]) -> dict[str, str]:
+        """The names of a folder's usable files, all in the store, by their SHA-256.
+
+        Raises DatasetError if there is none, and MachineError.
+        """
         if not folder.is_dir():
             raise DatasetError(f"{folder}: there is no such folder")
         originals = self._originals(folder, skipped)
@@ -216,8 +196,7 @@ class _FolderImport:
             reason = f": {skipped[-1]}" if skipped else ""
             raise DatasetError(f"{folder}: has no usable file among {', '.join(self.suffixes)}{reason}")
         remarks += [f"{path}: {remark_of[path]}" for path in prepared if remark_of.get(path)]
-        found = (Asset(path.relative_to(folder).as_posix(), prepared[path].stem) for path in remark_of)
-        return tuple(sorted(found, key=lambda asset: asset.sha256))
+        return {prepared[path].stem: path.relative_to(folder).as_posix() for path in remark_of}
 
     def _originals(self, folder: Path, skipped: list[str]) -> dict[str, Path]:
         """The files worth preparing by the SHA-256 that names them in the store; of equal ones the first."""
