@@ -10,6 +10,7 @@ import tyro
 
 from stereoforge.bundled_weights import named_weights
 from stereoforge.inputs.flag_values import check_max_disparity, shown
+from stereoforge.places import keep_apart
 from stereoforge.progress import console
 
 
@@ -33,6 +34,7 @@ class ExportModel:
 
     def run(self) -> None:
         """Write the ONNX file and compare its results with torch's."""
+        keep_apart("--out", self.out, "RUN", self.run_folder)
         from training.prediction.onnx_export import export_model
         from training.runs.model_card import write_model_card
 
@@ -43,5 +45,4 @@ class ExportModel:
         console.print(
             f"{exported.path}: {', '.join(exported.outputs)}; onnxruntime agrees with torch to "
             f"{exported.largest_difference:.1g}",
-            markup=False,
         )
