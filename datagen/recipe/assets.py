@@ -32,6 +32,7 @@ from scenes.geometry.building import solid
 from scenes.user_assets.pool import Asset, AssetPool, spread_over_splits
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import replacing, temporary_folder, walk_files
+from stereoforge_kit.messages import shortened
 from stereoforge_kit.processes import Limits, available_memory_bytes
 
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
@@ -59,6 +60,9 @@ MESH_LIMITS = Limits(timeout_s=120.0, memory_bytes=4 << 30)
 PICTURE_LIMITS = Limits(timeout_s=60.0, memory_bytes=4 << 30)
 """An environment of 16384 x 8192 pixels takes 1.6 GB before it is made smaller."""
 
+
+FILES_PER_WORKER = 2000
+"""A process that prepares files is replaced after so many: to start one takes as long as a hundred small files."""
 
 Preparer = Callable[[Path], dict[str, NDArray[np.generic]]]
 ImportProgress = Callable[[str, int, int], None]
@@ -222,12 +226,14 @@ class _FolderImport:
         available = available_memory_bytes()
         fitting = available // (self.limits.memory_bytes or available)
         workers = max(1, min(len(jobs), len(os.sched_getaffinity(0)), fitting))
-        executor = LocalExecutor(({},) * workers, WorkerPolicy(self.limits, attempts=1))
+        executor = LocalExecutor(
+            ({},) * workers, WorkerPolicy(self.limits, attempts=1, jobs_per_worker=FILES_PER_WORKER)
+        )
         with closing(executor.run(partial(_prepare_file, self.prepare), jobs)) as outcomes:
             for outcome in outcomes:
                 failure = outcome.failure
                 if failure is not None and failure.kind in ("environment", "disk_full"):
-                    raise MachineError(f"importing stopped, no file is at fault: {failure.sentence}"[:300])
+                    raise MachineError(f"importing stopped, no file is at fault: {failure.sentence}")
                 if failure is not None:
                     yield outcome.job[0], _Outcome(f"cannot be read, {failure.sentence}")
                 else:
@@ -249,7 +255,7 @@ def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> _Outcome:
     except KeyError as error:
         return _Outcome(f"cannot be read (it has no {error})")
     except Exception as error:
-        return _Outcome(f"cannot be read ({' '.join(str(error).split())[:200] or type(error).__name__})")
+        return _Outcome(f"cannot be read ({shortened(str(error), 200) or type(error).__name__})")
     remark = arrays.get(REMARK)
     temporary = target.with_suffix(f".{os.getpid()}.tmp")
     with temporary.open("wb") as file:
