@@ -25,6 +25,7 @@ from scenes.registry import FAMILIES
 from scenes.spec import NAME_ON_DISK, Deformation, Light, Scene, Shape, Texture
 from scenes.user_assets.pool import USER_SHAPES, USER_TEXTURES
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.messages import listed
 
 T = TypeVar("T")
 
@@ -98,7 +99,7 @@ def from_plain(data: Any, kind: type[T]) -> T:
         return _converter.structure(data, kind)
     except ClassValidationError as error:
         sentences = transform_error(error, path=kind.__name__, format_exception=_describe)
-        raise InputError("; ".join(sentences)) from error
+        raise InputError(listed(sentences, most=3, longest=160, separator="; ")) from error
     except (TypeError, KeyError, AttributeError) as error:
         raise InputError(f"{kind.__name__}: {error}") from error
 

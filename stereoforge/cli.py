@@ -15,9 +15,11 @@ from typing import Any
 
 from stereoforge.commands import COMMANDS, after_interruption, command_class, command_summary
 from stereoforge_kit.errors import UserError
+from stereoforge_kit.messages import LONGEST_MESSAGE, shortened
 from stereoforge_kit.siblings import check_siblings
 
 DEBUG_FLAG = "--debug"
+PROGRAM = "stereoforge: "
 DESCRIPTION = (
     "Make stereo training sets in Blender, train stereo networks on them, refine disparity.\n\n"
     f"Every command has --help, and takes {DEBUG_FLAG} to show where a failure came from. --version says which this is."
@@ -146,5 +148,5 @@ def _explain(error: Exception) -> tuple[str, int]:
 
 
 def _say(sentence: str, code: int) -> int:
-    print(f"stereoforge: {' '.join(sentence.split())}", file=sys.stderr)
+    print(f"{PROGRAM}{shortened(sentence, LONGEST_MESSAGE - len(PROGRAM))}", file=sys.stderr)
     return code

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from stereoforge.errors import UsageError
 from stereoforge_kit.files import is_within
+from stereoforge_kit.messages import shortened
 
 _PREFIX = re.compile(r"\w+:(?!//)")
 _PART = re.compile(r"#\d+-\d+\Z")
@@ -27,15 +28,11 @@ def keep_apart(flag: str, written: Path | str, source_flag: str, source: Path | 
     text = str(source)
     if any(is_within(written, place) for place in {text, _location(text)}):
         raise UsageError(
-            f"{flag} {_short(str(written))} is, or lies in, {source_flag} {_short(text)}, which is only read: write to "
-            "another place"
+            f"{flag} {shortened(str(written), _LONGEST)} is, or lies in, {source_flag} {shortened(text, _LONGEST)}, "
+            "which is only read: write to another place"
         )
 
 
 def _location(source: str) -> str:
     """The folder or URL of `[FORMAT:]LOCATION[#FIRST-LAST]`."""
     return _PREFIX.sub("", _PART.sub("", source), count=1)
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"...{text[3 - _LONGEST :]}"

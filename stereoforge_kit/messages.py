@@ -21,11 +21,11 @@ def shortened(text: str, longest: int) -> str:
     return f"{line[:first]}...{line[len(line) - (longest - 3 - first) :]}"
 
 
-def listed(names: Sequence[object], most: int = 5, longest: int = 40) -> str:
+def listed(names: Sequence[object], most: int = 5, longest: int = 40, separator: str = ", ") -> str:
     """Names for a sentence: the first few of them, each shortened, and how many more there are.
 
     >>> listed(range(8), most=3)
     '0, 1, 2 and 5 more'
     """
-    first = ", ".join(shortened(str(name), longest) for name in names[:most])
+    first = separator.join(shortened(str(name), longest) for name in names[:most])
     return f"{first} and {len(names) - most} more" if len(names) > most else first

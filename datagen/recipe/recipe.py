@@ -323,13 +323,10 @@ def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
     for key in sorted(set(before) | set(after), key=lambda key: (key != "world.family", key)):
         if before.get(key) != after.get(key):
             files = pool_difference(existing.assets, wanted.assets) if key.startswith("assets.") else None
+            settings = f"{key} {_brief(before.get(key))}, not {_brief(after.get(key))}"
             raise DatasetError(
-                (
-                    f"{folder} was rendered with other user assets, there are now {files}: "
-                    if files
-                    else f"{folder} was rendered with {key} {_brief(before.get(key))}, not {_brief(after.get(key))}: "
-                )
-                + "use the same settings to finish or extend it, or another folder"
+                f"{folder} was rendered with {f'other user assets, there are now {files}' if files else settings}: "
+                "use the same settings to finish or extend it, or another folder"
             )
     splits = [split for split in SPLITS if split in existing.scenes or split in wanted.scenes]
     counts = {split: max(existing.scenes.get(split, 0), wanted.scenes.get(split, 0)) for split in splits}

@@ -42,7 +42,6 @@ SCENE_TIMEOUT_S = 1800.0
 """How long one scene may take by default."""
 MEMORY_SHARE = 0.8
 """Share of the machine's memory that all workers together may use."""
-LONGEST_SENTENCE = 300
 NO_ROOM_BYTES = 16 << 20
 """With less room than this a failure is put down to the full disk: Blender does not say so itself."""
 
@@ -283,7 +282,7 @@ def _machine_sentence(failure: str) -> str:
     """What stops a run, for a person."""
     if "No module named 'bpy'" in failure:
         return NO_BLENDER
-    return f"rendering stopped, no scene is at fault: {failure}"[:LONGEST_SENTENCE]
+    return f"rendering stopped, no scene is at fault: {failure}"
 
 
 def _check_possible(

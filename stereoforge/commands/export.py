@@ -15,7 +15,7 @@ from datagen.export.folder import export_folder, export_record
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import shown
 from stereoforge.places import keep_apart
-from stereoforge.progress import console, progress_bar
+from stereoforge.progress import console, progress_bar, remark
 from stereoforge_kit.files import is_within, open_tree
 
 
@@ -78,4 +78,4 @@ class Export:
         console.print(f"{self.out}: {sum(map(len, sets))} frames as {self.format}")
         for sentence in (left_out(self.format, sets[0]), *(remarks or ())):
             if sentence:
-                console.print(sentence, markup=False, soft_wrap=True)
+                remark(sentence)

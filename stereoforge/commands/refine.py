@@ -15,7 +15,7 @@ from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import check_max_disparity, shown
 from stereoforge.inputs.images import pair_doubts, read_color_images
 from stereoforge.places import keep_apart
-from stereoforge.progress import console
+from stereoforge.progress import console, remark
 
 if TYPE_CHECKING:
     from refine.mrf.solve import MRFSolution
@@ -122,11 +122,10 @@ class Refine:
         doubts = [] if odd else _doubtful_views(left, right)
         doubts += _doubts(None if given is None else given[0], prediction.confidence)
         for note in (*remarks, *notes, *doubts, *_doubtful_result(solution.disparity)):
-            console.print(note, markup=False)
+            remark(note)
         console.print(
             f"{self.out}: disparity {solution.disparity.min():.1f} to {solution.disparity.max():.1f} px, refined in "
             f"{solution.info.seconds:.2f} s ({solution.info.solver}); look at {self.out / 'overview.png'}",
-            markup=False,
         )
 
     def _check(self) -> None:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from rich.markup import escape
 from rich.table import Table
 
 from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dataset
@@ -26,7 +25,7 @@ from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_histogram, parse_range, parse_shard, parse_size, shown
 from stereoforge.pipelines.rendering import choose_device
 from stereoforge.places import keep_apart
-from stereoforge.progress import console, progress_bar
+from stereoforge.progress import console, progress_bar, remark
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import open_tree
 from stereoforge_kit.viewing import duration
@@ -159,9 +158,9 @@ class Render:
             known = read_recipe(present).assets if present.is_file() else recipe.assets
             imported = self._import(store, known)
             for sentence in imported.skipped:
-                console.print(f"skipped {sentence}", markup=False)
+                remark(f"skipped {sentence}")
             for sentence in (*imported.remarks, *describe_splits(imported.pool)):
-                console.print(sentence, markup=False)
+                remark(sentence)
             try:
                 require_assets(imported.pool, (split for split, count in recipe.scenes.items() if count))
                 given = {kind: getattr(imported.pool, kind) for kind in ASSET_KINDS if getattr(self, kind)}
@@ -312,5 +311,5 @@ def _failure_table(failures: tuple[QuarantinedScene, ...]) -> Table:
     for heading in ("scene", "what happened", "attempts"):
         table.add_column(heading, overflow="fold")
     for entry in failures:
-        table.add_row(entry.name, escape(entry.reason), str(entry.attempts))
+        table.add_row(entry.name, entry.reason, str(entry.attempts))
     return table

@@ -69,10 +69,8 @@ class Study:
         for gap in result.gaps:
             shares = ", ".join(f"{name} {share:.0%}" for name, share in gap.shares.items() if share == share)
             if shares:
-                console.print(
-                    f"{gap.domain}, {gap.measure}: of a gap of {gap.size:.3g}, {shares}", markup=False
-                )
-        console.print(f"{result.report}", markup=False)
+                console.print(f"{gap.domain}, {gap.measure}: of a gap of {gap.size:.3g}, {shares}")
+        console.print(f"{result.report}")
 
     def _plan(self) -> StudyPlan:
         from stereoforge.study import DomainPlan, StudyPlan, read_plan

@@ -189,7 +189,6 @@ class Train:
         forest = train_forest(data, self.out, PLANS[self.preset], self.seed, self.device)
         console.print(
             f"{forest_file(self.out)}: {len(forest.roots)} trees of {len(forest.feature)} nodes in all",
-            markup=False,
         )
 
     def _changes(self) -> dict[str, Any]:
