@@ -14,12 +14,15 @@ import numpy as np
 import OpenEXR
 import pytest
 import trimesh
+from PIL import Image
 
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
 from datagen.dataset.shards import CACHE_VARIABLE
+from datagen.errors import FormatError
 from datagen.export import EXPORTERS, ExportOptions
+from datagen.formats.picture import read_picture
 from datagen.recipe.asset_pool import describe_splits, pool_to_text, require_assets
 from datagen.recipe.assets import (
     MAX_SIDE_PX,
@@ -327,6 +330,21 @@ def test_pictures_of_large_cameras_and_panoramas_are_made_smaller(tmp_path: Path
     assert cv2.imwrite(str(tmp_path / "sky.hdr"), panorama)
     radiance = prepare_environment(tmp_path / "sky.hdr")["radiance"]
     assert radiance.shape == (MAX_SIDE_PX // 2, MAX_SIDE_PX, 3)
+
+
+def test_pictures_that_are_made_smaller_may_be_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PNG files of more than 67 million pixels were refused, and above Pillow's limit all others."""
+    rows = np.linspace(0, 255, 9000).astype(np.uint8)
+    assert cv2.imwrite(str(tmp_path / "survey.png"), np.repeat(rows[:, None], 9000, axis=1))
+    image = prepare_texture(tmp_path / "survey.png")["image"]
+    assert image.shape == (MAX_SIDE_PX, MAX_SIDE_PX, 3)
+    assert np.abs(image[:: MAX_SIDE_PX // 4, 0, 0] - (0, 64, 128, 191)).max() <= 1
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
+    Image.new("RGB", (90, 60), (10, 20, 200)).save(tmp_path / "small.bmp")
+    assert prepare_texture(tmp_path / "small.bmp")["image"][0, 0].tolist() == [10, 20, 200]
+    assert Image.MAX_IMAGE_PIXELS == 1000
+    with pytest.raises(FormatError, match="more pixels"):
+        read_picture(tmp_path / "small.bmp")
 
 
 def test_fine_meshes_are_decimated(tmp_path: Path) -> None:
