@@ -242,8 +242,9 @@ def disk(arguments: argparse.Namespace, folder: Path) -> None:
         subprocess.run(["umount", mounted], check=True)
 
 
-def container(arguments: argparse.Namespace, folder: Path) -> None:  # noqa: ARG001
+def container(_: argparse.Namespace, folder: Path) -> None:
     """The commands as another user, with everything read-only but --out: once with a folder for temporary files."""
+    folder.chmod(0o755)
     for name, temporary in (("out-alone", None), ("with-temporary-folder", folder / "temporary")):
         out = folder / name
         writable = [out] if temporary is None else [out, temporary]
@@ -261,7 +262,7 @@ def container(arguments: argparse.Namespace, folder: Path) -> None:  # noqa: ARG
             remarks = [line for line in done.stderr.splitlines() if line.strip()]
             print(f"  {name}, {what}: exit code {done.returncode}; {remarks}", flush=True)
             check(f"{what} works, with at most one remark", done.returncode == 0 and len(remarks) <= 1)
-        check("no leftovers", not list(out.rglob(".*")))
+        check("no leftovers", not list(out.rglob(".temporary")))
 
 
 def run_contained(words: list[str], writable: list[Path]) -> subprocess.CompletedProcess[str]:
