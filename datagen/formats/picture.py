@@ -239,14 +239,14 @@ def _decode_deep_tiff(path: Path, data: bytes) -> Pixels:
 
 
 def _as_array(path: Path, image: Image.Image) -> Pixels:
-    """What Pillow decoded, without palettes and colour spaces of other kinds."""
+    """What Pillow decoded, without palettes and colour spaces of other kinds; a copy, since its own is read-only."""
     if image.mode.startswith("I;16"):
         return np.asarray(image).astype(np.uint16)
     if image.mode in ("I", "F"):
         raise _odd_values(path, "int32" if image.mode == "I" else "float32")
     if image.has_transparency_data:
-        return np.asarray(image.convert("RGBA"))
-    return np.asarray(image.convert("L" if image.mode in ("1", "L") else "RGB"))
+        return np.array(image.convert("RGBA"))
+    return np.array(image.convert("L" if image.mode in ("1", "L") else "RGB"))
 
 
 def _odd_values(path: Path, kind: str) -> PictureKindError:

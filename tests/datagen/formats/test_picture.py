@@ -205,3 +205,12 @@ def test_a_reduced_picture_is_the_mean_over_white(tmp_path: Path) -> None:
     assert np.abs(reduced - means).max() <= 1
     assert (reduced[:6] == 255).all()
     assert read_picture(path, longest_px=50).shape == (43, 90, 3)
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.ppm", "a.bmp", "a.tif", "a.webp", "a.gif"])
+def test_every_picture_can_be_written_to(name: str, tmp_path: Path) -> None:
+    """Kernels are compiled for such arrays only: evaluating a set of JPEG files ended in numba's TypeError."""
+    Image.new("RGB", (6, 4), (10, 200, 30)).save(tmp_path / name)
+    image = read_picture(tmp_path / name)
+    assert image.flags.writeable
+    assert image.flags.c_contiguous
