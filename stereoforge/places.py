@@ -1,8 +1,10 @@
-"""Commands must not write into what they read: the check of every pair of flags that name folders."""
+"""Where commands write: not into what they read, and only where they can."""
 
 from __future__ import annotations
 
 import re
+import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 from stereoforge.errors import UsageError
@@ -31,6 +33,28 @@ def keep_apart(flag: str, written: Path | str, source_flag: str, source: Path | 
             f"{flag} {shortened(str(written), _LONGEST)} is, or lies in, {source_flag} {shortened(text, _LONGEST)}, "
             "which is only read: write to another place"
         )
+
+
+def check_writable(flag: str, folder: Path) -> None:
+    """Raise UsageError unless files can be written into a folder, which need not be there yet.
+
+    To be asked before hours of work whose results go there. Nothing is left behind.
+    """
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except (FileExistsError, NotADirectoryError) as error:
+        raise UsageError(
+            f"{flag} {shortened(str(folder), _LONGEST)}: is a file, not a folder, or lies in one"
+        ) from error
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise UsageError(f"{flag} {shortened(str(folder), _LONGEST)}: cannot be written: {reason}") from error
+    finally:
+        for place in made:
+            with suppress(OSError):
+                place.rmdir()
 
 
 def _location(source: str) -> str:

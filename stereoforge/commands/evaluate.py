@@ -13,7 +13,7 @@ import tyro
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS, named_weights
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import check_max_disparity, parse_methods, several, shown
-from stereoforge.places import keep_apart
+from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console, remark
 from stereoforge_kit.messages import listed
 
@@ -75,6 +75,9 @@ class Evaluate:
             keep_apart("--out", self.out, "the data set", source)
             if self.submission is not None:
                 keep_apart("--submission", self.submission, "the data set", source)
+        check_writable("--out", self.out)
+        if self.submission is not None:
+            check_writable("--submission", self.submission)
         from stereoforge.pipelines.prediction import (
             fallback_notes,
             open_predictors,

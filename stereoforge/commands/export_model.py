@@ -10,7 +10,7 @@ import tyro
 
 from stereoforge.bundled_weights import named_weights
 from stereoforge.inputs.flag_values import check_max_disparity, shown
-from stereoforge.places import keep_apart
+from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console
 
 
@@ -35,6 +35,7 @@ class ExportModel:
     def run(self) -> None:
         """Write the ONNX file and compare its results with torch's."""
         keep_apart("--out", self.out, "RUN", self.run_folder)
+        check_writable("--out", self.out)
         from training.prediction.onnx_export import export_model
         from training.runs.model_card import write_model_card
 

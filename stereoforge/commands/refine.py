@@ -14,7 +14,7 @@ from stereoforge.bundled_weights import BUNDLED_WEIGHTS, named_weights
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import check_max_disparity, shown
 from stereoforge.inputs.images import pair_doubts, read_color_images
-from stereoforge.places import keep_apart
+from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console, remark
 
 if TYPE_CHECKING:
@@ -134,13 +134,12 @@ class Refine:
             raise UsageError("--disparity and --predictor sgbm both give the disparity; choose one")
         if self.disparity_right is not None and self.disparity is None:
             raise UsageError("--disparity-right goes with --disparity")
-        if self.out.exists() and not self.out.is_dir():
-            raise UsageError(f"--out {self.out}: is a file, not a folder")
         for name in WRITTEN:
             keep_apart("--out", self.out / name, "LEFT", self.left)
             keep_apart("--out", self.out / name, "RIGHT", self.right)
             keep_apart("--out", self.out / name, "--disparity", self.disparity)
             keep_apart("--out", self.out / name, "--disparity-right", self.disparity_right)
+        check_writable("--out", self.out)
 
     def _write(
         self,

@@ -10,7 +10,7 @@ import tyro
 
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_methods, several, shown
-from stereoforge.places import keep_apart
+from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console, remark
 from stereoforge_kit.messages import listed
 
@@ -52,6 +52,7 @@ class Tune:
         if self.out is not None:
             for source in self.data:
                 keep_apart("--out", self.out, "the data set", source)
+            check_writable("--out", self.out.parent)
         methods = parse_methods(self.methods)
         from rich.table import Table
 
