@@ -34,13 +34,13 @@ class ExportModel:
 
     def run(self) -> None:
         """Write the ONNX file and compare its results with torch's."""
-        keep_apart("--out", self.out, "RUN", self.run_folder)
+        check_max_disparity(self.max_disparity)
+        run = named_weights(self.run_folder)
+        keep_apart("--out", self.out, "RUN", run)
         check_writable("--out", self.out)
         from training.prediction.onnx_export import export_model
         from training.runs.model_card import write_model_card
 
-        check_max_disparity(self.max_disparity)
-        run = named_weights(self.run_folder)
         exported = export_model(run, self.out, self.device, self.max_disparity)
         write_model_card(run, self.out)
         console.print(
