@@ -36,7 +36,7 @@ from scenes.serialization import from_plain, to_plain
 from scenes.spec import OMIT_DEFAULT
 from scenes.user_assets.pool import AssetPool
 from stereoforge_kit.errors import InputError
-from stereoforge_kit.files import write_text
+from stereoforge_kit.files import Tree, write_text
 from stereoforge_kit.messages import shortened
 
 MAX_RECIPE_BYTES = 1 << 20
@@ -283,6 +283,14 @@ def read_recipe(path: Path) -> Recipe:
         raise DatasetError(f"there is no recipe {path}")
     return recipe_from_text(
         read_bounded(path, MAX_RECIPE_BYTES), str(path), partial(_read_pool, Layout(path.parent).asset_pool)
+    )
+
+
+def recipe_in(tree: Tree) -> Recipe:
+    """The recipe of a data set in a folder or behind a URL. Raises DatasetError as `read_recipe` does."""
+    names = Layout(Path())
+    return recipe_from_text(
+        tree.read(names.recipe.name), f"{tree.name}/{names.recipe}", lambda: tree.read(names.asset_pool.name)
     )
 
 

@@ -16,7 +16,7 @@ from datagen.errors import DatasetError, DiskFullError, MachineError
 from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
 from datagen.executors.devices import assign_devices, find_gpus
 from datagen.recipe.asset_pool import require_assets
-from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_from_text, write_recipe
+from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_in, write_recipe
 from datagen.rendering.card import update_card
 from datagen.rendering.preflight import NO_BLENDER, check_device, check_disparity_range, has_blender
 from datagen.rendering.quarantine import (
@@ -303,11 +303,12 @@ def _check_possible(
 
 def _merge(tree: Tree, recipe: Recipe) -> Recipe:
     """The recipe that the folder will have: the one that is there, if any, with the scenes that `recipe` adds."""
-    name, pool = Layout(Path()).recipe.name, Layout(Path()).asset_pool.name
-    if tree.exists(name):
-        existing = recipe_from_text(tree.read(name), f"{tree.name}/{name}", lambda: tree.read(pool))
-        return merge_into(existing, recipe, tree.name)
-    if set(tree.files_in("")) - {pool}:  # It is written first, so a run may have ended after it.
+    names = Layout(Path())
+    if tree.exists(names.recipe.name):
+        return merge_into(recipe_in(tree), recipe, tree.name)
+    if set(tree.files_in("")) - {
+        names.asset_pool.name
+    }:  # It is written first, so a run may have ended after it.
         raise DatasetError(f"{tree.name} is neither empty nor a data set; give a new or empty folder")
     return recipe
 
