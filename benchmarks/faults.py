@@ -4,6 +4,7 @@
     python -m benchmarks.faults restarts   [--scenes 300] [--kills 20]
     python -m benchmarks.faults repairs    [--scenes 2] [--kills 20]
     python -m benchmarks.faults disk       [--scenes 12]            (as root: it mounts a small file system)
+    python -m benchmarks.faults container                           (as root: it mounts everything read-only)
     python -m benchmarks.faults corrupt    [--trials 1000]
     python -m benchmarks.faults vouched    [--scenes 2] [--trials 1000]
     python -m benchmarks.faults flips      [--scenes 7] [--flips 200]
@@ -241,6 +242,49 @@ def disk(arguments: argparse.Namespace, folder: Path) -> None:
         subprocess.run(["umount", mounted], check=True)
 
 
+def container(_: argparse.Namespace, folder: Path) -> None:
+    """The commands as another user, with everything read-only but --out: once with a folder for temporary files."""
+    folder.chmod(0o755)
+    for name, temporary in (("out-alone", None), ("with-temporary-folder", folder / "temporary")):
+        out = folder / name
+        writable = [out] if temporary is None else [out, temporary]
+        for place in writable:
+            place.mkdir(mode=0o777)
+            place.chmod(0o777)
+        view = f"{out}/set/frames_cleanpass/TRAIN/A/0000/{{}}/0006.png"
+        commands = {
+            "render": f"render --out {out}/set --scenes 2 --size 160x90 --samples 1",
+            "refine": f"refine {view.format('left')} {view.format('right')} --out {out}/refined --device cpu",
+            "train": f"train regressor --data {out}/set --preset tiny --steps 2 --crop 128x64 --out {out}/run",
+        }
+        for what, words in commands.items():
+            done = run_contained(words.split(), writable)
+            remarks = [line for line in done.stderr.splitlines() if line.strip()]
+            print(f"  {name}, {what}: exit code {done.returncode}; {remarks}", flush=True)
+            check(f"{what} works, with at most one remark", done.returncode == 0 and len(remarks) <= 1)
+        check("no leftovers", not list(out.rglob(".temporary")))
+
+
+def run_contained(words: list[str], writable: list[Path]) -> subprocess.CompletedProcess[str]:
+    """Run a command as nobody, with a HOME that is not there, where only some folders can be written."""
+    mounts = [f"mount --bind {place} {place}" for place in writable]
+    script = " && ".join(["mount --make-rprivate /", *mounts, "mount -o remount,ro,bind /", 'exec "$@"'])
+    # It may read the interpreter wherever it lies, as the files of an image are everybody's to read.
+    nobody = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
+    nobody += ["--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"]
+    variables = {"HOME": "/nonexistent", "PATH": "/usr/bin:/bin", "PYTHONPATH": str(Path.cwd())}
+    if len(writable) > 1:
+        variables["TMPDIR"] = str(writable[1])
+    program = [sys.executable, "-m", "stereoforge", *words]
+    return subprocess.run(
+        ["unshare", "--mount", "sh", "-c", script, "sh", *nobody, *program],
+        env=variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
 def corrupt(arguments: argparse.Namespace, folder: Path) -> None:
     """Damaged files through every reader, in a process with 5 seconds and 1 GiB beyond what it starts with."""
     for name, example in make_examples(folder).items():
@@ -473,7 +517,19 @@ def nodes(arguments: argparse.Namespace, folder: Path) -> None:
 
 EXPERIMENTS = {
     function.__name__: function
-    for function in (kills, restarts, repairs, disk, corrupt, vouched, flips, memory, throughput, nodes)
+    for function in (
+        kills,
+        restarts,
+        repairs,
+        disk,
+        container,
+        corrupt,
+        vouched,
+        flips,
+        memory,
+        throughput,
+        nodes,
+    )
 }
 SCENES = {
     "kills": 300,

@@ -25,6 +25,7 @@ from scenes.registry import FAMILIES
 from scenes.spec import NAME_ON_DISK, Deformation, Light, Scene, Shape, Texture
 from scenes.user_assets.pool import USER_SHAPES, USER_TEXTURES
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.messages import listed
 
 T = TypeVar("T")
 
@@ -37,7 +38,7 @@ def _tagged(converter: Converter, base: Any, kinds: Mapping[str, type], tag: str
         kind = kinds.get(str(data.get(tag))) if isinstance(data, dict) else None
         if kind is None:
             raise InputError(
-                f"a {base.__name__} needs {tag!r}, one of {', '.join(kinds)}; got {str(data)[:80]!r}"
+                f"a {base.__name__} needs {tag!r}, not {str(data)[:60]!r}; one of {listed([*kinds], most=6)}"
             )
         return converter.structure({key: value for key, value in data.items() if key != tag}, kind)
 
@@ -98,7 +99,7 @@ def from_plain(data: Any, kind: type[T]) -> T:
         return _converter.structure(data, kind)
     except ClassValidationError as error:
         sentences = transform_error(error, path=kind.__name__, format_exception=_describe)
-        raise InputError("; ".join(sentences)) from error
+        raise InputError(listed(sentences, most=3, longest=200, separator="; ")) from error
     except (TypeError, KeyError, AttributeError) as error:
         raise InputError(f"{kind.__name__}: {error}") from error
 

@@ -14,10 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from stereoforge.commands import COMMANDS, after_interruption, command_class, command_summary
+from stereoforge.temporary_files import temporary_files_in_out
 from stereoforge_kit.errors import UserError
+from stereoforge_kit.messages import LONGEST_MESSAGE, shortened
 from stereoforge_kit.siblings import check_siblings
 
 DEBUG_FLAG = "--debug"
+PROGRAM = "stereoforge: "
 DESCRIPTION = (
     "Make stereo training sets in Blender, train stereo networks on them, refine disparity.\n\n"
     f"Every command has --help, and takes {DEBUG_FLAG} to show where a failure came from. --version says which this is."
@@ -44,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         _leave_current_folder()
         check_siblings(__file__, "scenes", "datagen", "training", "refine")
-        with _terminated_like_interrupted():
+        with _terminated_like_interrupted(), temporary_files_in_out(words):
             command = _parse([word for word in words if word != DEBUG_FLAG])
             command.run()
     except KeyboardInterrupt:
@@ -146,5 +149,5 @@ def _explain(error: Exception) -> tuple[str, int]:
 
 
 def _say(sentence: str, code: int) -> int:
-    print(f"stereoforge: {' '.join(sentence.split())}", file=sys.stderr)
+    print(f"{PROGRAM}{shortened(sentence, LONGEST_MESSAGE - len(PROGRAM))}", file=sys.stderr)
     return code

@@ -8,11 +8,20 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from stereoforge_kit.messages import LONGEST_MESSAGE, shortened
+
 
 class UserError(Exception):
-    """Something that the user can put right. The message is one whole sentence that says what is wrong and where."""
+    """Something that the user can put right. The message is one whole sentence that says what is wrong and where.
+
+    Of a message that would be longer than `LONGEST_MESSAGE` characters, for a long path or what another program said,
+    the middle is left out.
+    """
 
     exit_code: ClassVar[int] = 1
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(message if len(message) <= LONGEST_MESSAGE else shortened(message, LONGEST_MESSAGE))
 
 
 class InputError(UserError, ValueError):

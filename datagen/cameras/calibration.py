@@ -173,4 +173,4 @@ class CalibrationText:
 
 def not_understood(texts: tuple[CalibrationText, ...], reason: object) -> FormatError:
     """The error about files that are no calibration, in one sentence."""
-    return FormatError(f"{', '.join(text.name for text in texts)}: {reason}"[:300])
+    return FormatError(f"{', '.join(text.name for text in texts)}: {reason}")

@@ -1,6 +1,7 @@
 """The paths of a data set: the tree of FlyingThings3D (Mayer et al., CVPR 2016), and more beside it.
 
     recipe.yaml
+    assets.json                                     the list of the user assets, if there are any
     frames_cleanpass/TRAIN/A/0003/left/0006.png     one file for each view and frame
     camera_data/TRAIN/A/0003/camera_data.txt        one file for each scene
     camera_data/TRAIN/A/0003/cameras.json           one file for each scene
@@ -168,6 +169,11 @@ class Layout:
     def assets(self) -> Path:
         """The folder of the prepared user assets (`datagen.recipe.assets`)."""
         return self.root / "assets"
+
+    @property
+    def asset_pool(self) -> Path:
+        """The path of the list of the user assets, which the recipe names by its SHA-256."""
+        return self.root / "assets.json"
 
     @property
     def recipe(self) -> Path:

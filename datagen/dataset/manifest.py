@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from datagen.errors import DatasetError
 from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from stereoforge_kit.files import write_text
+from stereoforge_kit.messages import listed
 
 T = TypeVar("T")
 
@@ -138,7 +139,7 @@ _MANIFEST_TYPES: dict[str, type] = {
 def _typed(record: type[T], types: dict[str, type], data: dict[str, Any]) -> T:
     """Build `record` from exactly the named fields, none of them converted from another type."""
     if data.keys() != types.keys():
-        raise TypeError(f"its fields are {', '.join(map(str, data))}")
+        raise TypeError(f"its fields are {listed([*data])}")
     for name, kind in types.items():
         if type(data[name]) is not kind:
             raise TypeError(f"{name} is {str(data[name])[:40]!r}, which is no {kind.__name__}")

@@ -66,9 +66,10 @@ def open_remote(tree: Tree, folder: Path | None = None) -> RemoteLayout:
     Raises DatasetError if there is no data set.
     """
     layout = RemoteLayout(folder or _cache_folder(tree), tree)
-    with suppress(FileNotFoundError):
-        layout.recipe.unlink()  # The data set may have grown.
-    layout.local(layout.recipe)
+    for path in (layout.recipe, layout.asset_pool):
+        with suppress(FileNotFoundError):
+            path.unlink()  # The data set may have grown.
+        layout.local(path)
     if not layout.recipe.is_file():
         raise DatasetError(f"{tree.name}: is not a data set, it has no {layout.recipe.name}")
     return layout

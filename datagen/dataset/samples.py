@@ -382,7 +382,8 @@ def open_layout(root: Path | str) -> Layout:
         return open_remote(tree)
     layout = Layout(tree.root)
     if not layout.root.is_dir():
-        raise DatasetError(f"{layout.root}: there is no such folder")
+        what = "is a file, not a folder" if layout.root.exists() else "there is no such folder"
+        raise DatasetError(f"{layout.root}: {what}")
     if not layout.recipe.is_file():
         raise DatasetError(f"{layout.root}: is not a data set, it has no {layout.recipe.name}")
     return layout

@@ -48,7 +48,12 @@ _CANNOT_HOLD = {
         "disparity_gradient",
         "objects that are no vehicles",
         "poses",
-        *EXTRA_TARGETS,
+        "material_index",
+        "depth",
+        "normals",
+        "optical_flow into the past and of the right view",
+        "disparity_change into the past and of the right view",
+        "motion_boundaries",
     ),
     "sceneflow": ("disparity_gradient", "occlusion", "object_index", "depth", "normals", "material_index"),
     "webdataset": (),
@@ -56,13 +61,14 @@ _CANNOT_HOLD = {
     "coco": (),
     "depth": (),
 }
-"""What the layout of a format has no place for."""
+"""What the layout of a format has no place for; what begins with a target's name only where a set has the target."""
 
 
 def left_out(name: str, dataset: StereoDataset) -> str | None:
     """A sentence: what of a data set the format of this name cannot hold; None if it holds all. Raises DatasetError."""
     there = set(read_recipe(dataset.layout.recipe).targets)
-    lacking = [what for what in _CANNOT_HOLD[name] if what not in EXTRA_TARGETS or what in there]
+    absent = tuple(set(EXTRA_TARGETS) - there)
+    lacking = [what for what in _CANNOT_HOLD[name] if not what.startswith(absent)]
     return f"{name} has no place for: {', '.join(lacking)}" if lacking else None
 
 

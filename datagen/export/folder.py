@@ -33,7 +33,7 @@ _OURS = re.compile(
             re.escape(INDEX_NAME),
         ]
     )
-    + rf"|recipe\.yaml|{'|'.join(FOLDERS)}"
+    + rf"|recipe\.yaml|assets\.json|{'|'.join(FOLDERS)}"
 )
 """What exports have at the top of their folder. Whatever else is there is somebody else's and stays."""
 

@@ -12,16 +12,16 @@ import tarfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 
-from datagen.dataset.layout import EXTRA_TARGETS, KINDS, RENDER_PASSES, TARGETS, VIEWS
+from datagen.dataset.layout import EXTRA_TARGETS, KINDS, RENDER_PASSES, TARGETS, VIEWS, Layout
 from datagen.dataset.manifest import FileEntry, file_entry, read_manifest, seal
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.errors import DatasetError
 from datagen.formats import read_camera_data
 from datagen.formats.cameras_json import rig_numbers
-from datagen.recipe.recipe import read_recipe, recipe_to_text
+from datagen.recipe.recipe import read_recipe, write_recipe
 from datagen.sources.webdataset import INDEX_NAME, META
 from stereoforge_kit.errors import InputError
-from stereoforge_kit.files import Tree
+from stereoforge_kit.files import Tree, temporary_folder
 
 
 def export_webdataset(
@@ -58,18 +58,26 @@ def export_webdataset(
                         done += 1
                         progress(done, total)
                 files.append(replace(file_entry(path.parent, path), path=name))
-    out.write(sets[0].layout.recipe.name, _recipe_text(sets[0][0]).encode())
+    _write_recipe(out, sets[0][0])
     out.write(INDEX_NAME, seal({"shards": index, "files": [asdict(entry) for entry in files]}).encode())
 
 
-def _recipe_text(sample: StereoSample) -> str:
-    """The text of the data set's recipe. Raises DatasetError if a sample's scene was rendered by another recipe."""
+def _write_recipe(out: Tree, sample: StereoSample) -> None:
+    """Write the data set's recipe and the list of its user assets.
+
+    Raises DatasetError if a sample's scene was rendered by another recipe.
+    """
     layout = sample.layout
     recipe = read_recipe(layout.recipe)
     manifest = read_manifest(layout.local(layout.manifest(sample.split, sample.scene)))
     if recipe.settings_sha256() != manifest.recipe_sha256:
         raise DatasetError(f"{layout.recipe}: is not the recipe that the scenes were rendered by")
-    return recipe_to_text(recipe)
+    with temporary_folder() as folder:
+        staged = Layout(folder)
+        write_recipe(staged.recipe, recipe)
+        for path in (staged.asset_pool, staged.recipe):
+            if path.exists():
+                out.write(path.name, path.read_bytes())
 
 
 def _add(tar: tarfile.TarFile, sample: StereoSample) -> str:

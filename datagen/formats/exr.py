@@ -20,6 +20,7 @@ from datagen.errors import FormatError
 from datagen.formats.limits import check_image_size, read_bounded
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import replacing
+from stereoforge_kit.messages import shortened
 
 _MAGIC_AND_VERSION = struct.pack("<II", 20000630, 2)
 """Version 2 with no flag set: one part, scan lines, short names, no deep data."""
@@ -60,7 +61,7 @@ def read_channels(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[np.fl
         with OpenEXR.File(str(path), separate_channels=True, num_threads=0) as file:
             planes = {name: np.array(file.channels()[name].pixels) for name in names}
     except (RuntimeError, ValueError, TypeError, KeyError) as error:
-        raise FormatError(f"{path}: is a damaged EXR file: {' '.join(str(error).split())}") from error
+        raise FormatError(f"{path}: is a damaged EXR file: {shortened(str(error), 150)}") from error
     if any(plane.shape != (height, width) or plane.dtype != np.float32 for plane in planes.values()):
         raise FormatError(f"{path}: its channels do not have the size its header declares")
     return planes

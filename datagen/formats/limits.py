@@ -10,6 +10,8 @@ from datagen.errors import FormatError
 
 MAX_ELEMENTS = 2**28
 """Most numbers an array may have, 1 GiB of float32. A header that promises more is damaged."""
+MAX_ELEMENTS_TO_REDUCE = 2**30
+"""Most numbers of 8 or 16 bits that a picture may have that is made smaller as soon as it is decoded."""
 MAX_FILE_BYTES = 2**31
 """Largest file that is read."""
 MAX_JSON_BYTES = 2**25
@@ -41,12 +43,14 @@ def require_regular(path: Path) -> os.stat_result:
     return status
 
 
-def check_image_size(origin: Path | str, width: int, height: int, channels: int) -> None:
-    """Raise FormatError, naming `origin`, for an image that is empty or has more than `MAX_ELEMENTS` numbers."""
+def check_image_size(
+    origin: Path | str, width: int, height: int, channels: int, most: int = MAX_ELEMENTS
+) -> None:
+    """Raise FormatError, naming `origin`, for an image that is empty or has more than `most` numbers."""
     if width <= 0 or height <= 0:
         raise FormatError(f"{origin}: its header declares an image of {width} x {height} pixels")
-    if width * height * channels > MAX_ELEMENTS:
+    if width * height * channels > most:
         raise FormatError(
             f"{origin}: its header declares {width} x {height} pixels of {channels} channels, "
-            f"more than the {MAX_ELEMENTS} numbers allowed"
+            f"more than the {most} numbers allowed"
         )

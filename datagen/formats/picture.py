@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import io
 import re
+import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,12 @@ from PIL import ExifTags, Image, ImageOps
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from datagen.errors import FormatError
-from datagen.formats.limits import check_image_size, read_bounded
+from datagen.formats.limits import (
+    MAX_ELEMENTS,
+    MAX_ELEMENTS_TO_REDUCE,
+    check_image_size,
+    read_bounded,
+)
 from datagen.formats.png import decode_png, read_png
 
 _PNM_HEADER = re.compile(rb"P([56])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})\s+(\d{1,5})\s")
@@ -42,6 +49,9 @@ _TURNS: dict[int, Callable[[NDArray[Any]], NDArray[Any]]] = {
 }
 """What brings a picture upright, by its Exif orientation."""
 
+_STRIP_PX = 1 << 22
+_PILLOW = threading.Lock()
+
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
@@ -54,8 +64,10 @@ def read_picture(path: Path | str, longest_px: int | None = None) -> NDArray[np.
 
     The Exif orientation is applied. Grey is repeated, CMYK and palettes are converted. What is transparent shows white
     behind it. 16 bits are scaled to 8; where no value is above 4095 the picture has 12 bits, and these are scaled to 8.
-    A JPEG file larger than `longest_px`, where that is given, is decoded to a half, a quarter or an eighth of its size,
-    as long as no side falls below it.
+
+    Where `longest_px` is given, a picture whose longest side is twice that or more is divided by a whole number, so
+    that this side stays at least so long. Such a picture may be larger than others, and costs its own 8 or 16 bits a
+    number and little more; a JPEG file is decoded to a half, a quarter or an eighth of its size in the first place.
 
     Raises FormatError for a file that is missing or damaged, PictureKindError for one that holds several pictures, or
     numbers that are no colours, or more pixels than a picture has.
@@ -69,7 +81,8 @@ def read_picture(path: Path | str, longest_px: int | None = None) -> NDArray[np.
     [[[7, 7, 7], [200, 200, 200]]]
     """
     pixels = _decode(Path(path), longest_px)
-    return _as_color(pixels, _full_scale(pixels))
+    full = _full_scale(pixels)
+    return _as_color(pixels, full) if longest_px is None else _reduced(pixels, full, longest_px)
 
 
 def read_pair(left: Path | str, right: Path | str) -> tuple[NDArray[np.uint8], NDArray[np.uint8], list[str]]:
@@ -126,16 +139,17 @@ def _decode(path: Path, longest_px: int | None = None) -> Pixels:
     data = read_bounded(path)
     if data[:2] in _FLOAT_MAPS:
         raise PictureKindError(f"{path}: is a map of numbers, not a picture")
+    most = MAX_ELEMENTS if longest_px is None else MAX_ELEMENTS_TO_REDUCE
     if data.startswith(b"\x89PNG"):
-        pixels = decode_png(data, str(path))
-        return _turned(pixels, _png_orientation(data)) if b"eXIf" in data else pixels
+        pixels = decode_png(data, str(path), most)
+        return _turned(pixels, _png_orientation(data, most)) if b"eXIf" in data else pixels
     if data[:2] in (b"P5", b"P6"):
         return read_pnm(path)
-    return _decode_with_pillow(path, data, longest_px)
+    return _decode_with_pillow(path, data, longest_px, most)
 
 
-def _png_orientation(data: bytes) -> int:
-    with Image.open(io.BytesIO(data)) as image:
+def _png_orientation(data: bytes, most: int) -> int:
+    with _limit(most), Image.open(io.BytesIO(data)) as image:
         return int(image.getexif().get(ExifTags.Base.Orientation, 1))
 
 
@@ -143,18 +157,18 @@ def _turned(pixels: Pixels, orientation: int) -> Pixels:
     return np.ascontiguousarray(_TURNS[orientation](pixels)) if orientation in _TURNS else pixels
 
 
-def _decode_with_pillow(path: Path, data: bytes, longest_px: int | None) -> Pixels:
+def _decode_with_pillow(path: Path, data: bytes, longest_px: int | None, most: int) -> Pixels:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Of odd metadata, and of sizes, which are checked here.
-            if data[:4] in _TIFF and _is_deep(path, data):
+            if data[:4] in _TIFF and _is_deep(path, data, most):
                 return _decode_deep_tiff(path, data)
-            with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+            with _limit(most), Image.open(io.BytesIO(data), formats=_FORMATS) as image:
                 if longest_px is not None:
                     image.draft(
                         None, (longest_px, longest_px)
                     )  # JPEG decodes to a half, a quarter, an eighth.
-                _check_kind(path, image)
+                _check_kind(path, image, most)
                 image.load()
                 return _as_array(path, ImageOps.exif_transpose(image))
     except FormatError:
@@ -167,9 +181,23 @@ def _decode_with_pillow(path: Path, data: bytes, longest_px: int | None) -> Pixe
         ) from error
 
 
-def _check_kind(path: Path, image: Image.Image) -> None:
+@contextmanager
+def _limit(most: int) -> Iterator[None]:
+    """Without Pillow's own limit on pixels, which holds for the whole process, where more numbers may be decoded."""
+    if most == MAX_ELEMENTS:
+        yield
+        return
+    with _PILLOW:
+        before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+        try:
+            yield
+        finally:
+            Image.MAX_IMAGE_PIXELS = before
+
+
+def _check_kind(path: Path, image: Image.Image, most: int) -> None:
     """Refuse by the header what should not be decoded."""
-    _check_size(path, *image.size)
+    _check_size(path, *image.size, most)
     pictures = getattr(image, "n_frames", 1)
     if pictures > 1 and image.format != "MPO":  # Telephones add a preview or a map of brightness.
         raise PictureKindError(f"{path}: holds {pictures} pictures; one is needed")
@@ -177,14 +205,14 @@ def _check_kind(path: Path, image: Image.Image) -> None:
         raise _odd_values(path, "float32")
 
 
-def _check_size(path: Path, width: int, height: int) -> None:
+def _check_size(path: Path, width: int, height: int, most: int) -> None:
     try:
-        check_image_size(path, width, height, channels=3)
+        check_image_size(path, width, height, 3, most)
     except FormatError as error:
         raise PictureKindError(str(error)) from error
 
 
-def _is_deep(path: Path, data: bytes) -> bool:
+def _is_deep(path: Path, data: bytes, most: int) -> bool:
     """Whether a TIFF file has more than 8 bits a channel, by its header."""
     file = io.BytesIO(data)
     tags = ImageFileDirectory_v2(file.read(8))
@@ -192,7 +220,7 @@ def _is_deep(path: Path, data: bytes) -> bool:
     tags.load(file)
     if max(tags.get(_BITS_PER_SAMPLE, (1,))) <= 8:
         return False
-    _check_size(path, tags[_WIDTH], tags[_HEIGHT])
+    _check_size(path, tags[_WIDTH], tags[_HEIGHT], most)
     if tags.next:
         raise PictureKindError(f"{path}: holds several pictures; one is needed")
     return True
@@ -211,18 +239,33 @@ def _decode_deep_tiff(path: Path, data: bytes) -> Pixels:
 
 
 def _as_array(path: Path, image: Image.Image) -> Pixels:
-    """What Pillow decoded, without palettes and colour spaces of other kinds."""
+    """What Pillow decoded, without palettes and colour spaces of other kinds; a copy, since its own is read-only."""
     if image.mode.startswith("I;16"):
         return np.asarray(image).astype(np.uint16)
     if image.mode in ("I", "F"):
         raise _odd_values(path, "int32" if image.mode == "I" else "float32")
     if image.has_transparency_data:
-        return np.asarray(image.convert("RGBA"))
-    return np.asarray(image.convert("L" if image.mode in ("1", "L") else "RGB"))
+        return np.array(image.convert("RGBA"))
+    return np.array(image.convert("L" if image.mode in ("1", "L") else "RGB"))
 
 
 def _odd_values(path: Path, kind: str) -> PictureKindError:
     return PictureKindError(f"{path}: holds {kind} values; a picture has 8 or 16 bits a channel")
+
+
+def _reduced(pixels: Pixels, full: int, longest_px: int) -> NDArray[np.uint8]:
+    """`_as_color`, divided by a whole number; in strips, since colours over white take four times the memory."""
+    factor = max(pixels.shape[:2]) // longest_px
+    if factor <= 1:
+        return _as_color(pixels, full)
+    height, width = (max(1, length // factor) for length in pixels.shape[:2])
+    rows = max(1, _STRIP_PX // (factor * pixels.shape[1]))
+    reduced = np.empty((height, width, 3), np.uint8)
+    for top in range(0, height, rows):
+        strip = _as_color(pixels[factor * top : factor * min(top + rows, height), : factor * width], full)
+        size = (width, min(rows, height - top))
+        reduced[top : top + rows] = cv2.resize(strip, size, interpolation=cv2.INTER_AREA)
+    return reduced
 
 
 def _full_scale(pixels: Pixels) -> int:

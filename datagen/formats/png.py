@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
-from datagen.formats.limits import check_image_size, read_bounded, require_regular
+from datagen.formats.limits import MAX_ELEMENTS, check_image_size, read_bounded, require_regular
 from stereoforge_kit.files import write_bytes
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -29,9 +29,9 @@ def read_png(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
     return decode_png(read_bounded(Path(path)), str(path))
 
 
-def decode_png(data: bytes, origin: str) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """Decode the content of a PNG file as `read_png` does; `origin` names the file in errors."""
-    _check_chunks(origin, data)
+def decode_png(data: bytes, origin: str, most: int = MAX_ELEMENTS) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Decode the content of a PNG file of at most so many numbers as `read_png` does; `origin` names it in errors."""
+    _check_chunks(origin, data, most)
     image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise FormatError(f"{origin}: is a PNG file whose pixels do not decode")
@@ -84,7 +84,7 @@ def write_png(path: Path | str, array: NDArray[np.uint8] | NDArray[np.uint16]) -
     write_bytes(path, data.tobytes())
 
 
-def _check_chunks(origin: str, data: bytes) -> None:
+def _check_chunks(origin: str, data: bytes, most: int) -> None:
     """Walk the chunks: signature, bounded image header, checksums, an end, and nothing after it."""
     if not data.startswith(_SIGNATURE):
         raise FormatError(f"{origin}: is not a PNG file, its signature is missing")
@@ -103,7 +103,7 @@ def _check_chunks(origin: str, data: bytes) -> None:
         if (position == len(_SIGNATURE)) != (name == b"IHDR"):
             raise FormatError(f"{origin}: is a PNG file that does not begin with its one image header")
         if name == b"IHDR":
-            _check_header(origin, data[position + 8 : end - 4])
+            _check_header(origin, data[position + 8 : end - 4], most)
         if name in (b"acTL", b"fcTL", b"fdAT"):
             raise FormatError(f"{origin}: is an animated PNG file, not one image")
         position = end
@@ -111,8 +111,8 @@ def _check_chunks(origin: str, data: bytes) -> None:
         raise FormatError(f"{origin}: is a PNG file with {len(data) - position} bytes after its end")
 
 
-def _check_header(origin: str, header: bytes) -> None:
+def _check_header(origin: str, header: bytes, most: int) -> None:
     if len(header) != 13:
         raise FormatError(f"{origin}: is a PNG file whose image header has {len(header)} bytes, not 13")
     width, height = struct.unpack_from(">II", header)
-    check_image_size(origin, width, height, channels=4)
+    check_image_size(origin, width, height, channels=4, most=most)

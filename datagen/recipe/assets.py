@@ -11,7 +11,7 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -24,19 +24,17 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from datagen.dataset.layout import SPLITS
 from datagen.dataset.shards import cache_folder
 from datagen.errors import DatasetError, MachineError
 from datagen.executors import LocalExecutor, WorkerPolicy
 from datagen.formats.picture import read_picture
 from scenes.geometry.building import solid
-from scenes.user_assets.pool import Asset, AssetPool
+from scenes.user_assets.pool import Asset, AssetPool, spread_over_splits
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import replacing, temporary_folder, walk_files
+from stereoforge_kit.messages import shortened
 from stereoforge_kit.processes import Limits, available_memory_bytes
 
-ASSET_KINDS = ("meshes", "textures", "environments")
-"""The fields of `AssetPool` that hold files, named as their flags are."""
 MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
 TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 ENVIRONMENT_SUFFIXES = (".hdr", ".exr")
@@ -63,6 +61,9 @@ PICTURE_LIMITS = Limits(timeout_s=60.0, memory_bytes=4 << 30)
 """An environment of 16384 x 8192 pixels takes 1.6 GB before it is made smaller."""
 
 
+FILES_PER_WORKER = 2000
+"""A process that prepares files is replaced after so many: to start one takes as long as a hundred small files."""
+
 Preparer = Callable[[Path], dict[str, NDArray[np.generic]]]
 ImportProgress = Callable[[str, int, int], None]
 """Told of a kind of files how many are done, and how many there are."""
@@ -86,6 +87,7 @@ def import_assets(
     textures: Path | None = None,
     environments: Path | None = None,
     up_axis: UpAxis = "auto",
+    known: AssetPool | None = None,
     progress: ImportProgress | None = None,
 ) -> ImportedAssets:
     """Prepare all usable files below the given folders into `store`, as many at a time as there are cores.
@@ -99,6 +101,7 @@ def import_assets(
         textures: A folder of PNG, JPEG, TIFF, WebP and BMP files.
         environments: A folder of equirectangular Radiance HDR and OpenEXR files.
         up_axis: Which axis of the meshes points up, "y" or "z"; "auto" for what is usual in their format (`Y_UP`).
+        known: A pool whose files keep their splits, as a data set's that already shows some of them.
         progress: Called with how many files of a kind are done, how many there are, and the kind.
 
     Raises:
@@ -119,7 +122,8 @@ def import_assets(
             continue
         report = None if progress is None else partial(progress, kind)
         work = _FolderImport(suffixes, prepare, limits, store, partial(_identity, up_axis), report)
-        kinds.append(work.run(folder, skipped, remarks))
+        decided = () if known is None else getattr(known, kind)
+        kinds.append(spread_over_splits(work.run(folder, skipped, remarks), decided))
     pool = AssetPool(meshes=kinds[0], textures=kinds[1], environments=kinds[2])
     return ImportedAssets(pool, tuple(skipped), tuple(remarks))
 
@@ -141,34 +145,11 @@ def prepared_assets_folder() -> Iterator[Path]:
 def copy_prepared(pool: AssetPool, store: Path, target: Path) -> None:
     """Copy the prepared files of a pool from one store to another, each whole or not at all, unless they are there."""
     target.mkdir(parents=True, exist_ok=True)
-    for asset in (*pool.meshes, *pool.textures, *pool.environments):
+    for asset in pool.files:
         name = f"{asset.sha256}.npz"
         if not is_zipfile(target / name):
             with replacing(target / name) as temporary:
                 shutil.copyfile(store / name, temporary)
-
-
-def describe_splits(pool: AssetPool) -> list[str]:
-    """A sentence for each kind of user assets that there are: how many files each split has."""
-    sentences = []
-    for name in ASSET_KINDS:
-        if files := getattr(pool, name):
-            counts = [f"{len(getattr(pool.of_split(split), name))} {split}" for split in SPLITS]
-            sentences.append(f"{name}: {len(files)} files, {', '.join(counts)}")
-    return sentences
-
-
-def require_assets(pool: AssetPool, splits: Iterable[str]) -> None:
-    """Raise DatasetError for a split without any file of a kind that there are files of."""
-    for split in splits:
-        of_split = pool.of_split(split)
-        for name in ASSET_KINDS:
-            files = getattr(pool, name)
-            if files and not getattr(of_split, name):
-                raise DatasetError(
-                    f"split {split} has none of the {len(files)} files of --{name}, each of which is used in one split "
-                    "only; with three files or more every split has some"
-                )
 
 
 def _identity(up_axis: UpAxis, path: Path) -> bytes:
@@ -194,8 +175,11 @@ class _FolderImport:
     identity: Callable[[Path], bytes] = lambda _: b""
     report: Callable[[int, int], None] | None = None
 
-    def run(self, folder: Path, skipped: list[str], remarks: list[str]) -> tuple[Asset, ...]:
-        """The usable files of a folder, all in the store. Raises DatasetError if it has none, and MachineError."""
+    def run(self, folder: Path, skipped: list[str], remarks: list[str]) -> dict[str, str]:
+        """The names of a folder's usable files, all in the store, by their SHA-256.
+
+        Raises DatasetError if there is none, and MachineError.
+        """
         if not folder.is_dir():
             raise DatasetError(f"{folder}: there is no such folder")
         originals = self._originals(folder, skipped)
@@ -216,8 +200,7 @@ class _FolderImport:
             reason = f": {skipped[-1]}" if skipped else ""
             raise DatasetError(f"{folder}: has no usable file among {', '.join(self.suffixes)}{reason}")
         remarks += [f"{path}: {remark_of[path]}" for path in prepared if remark_of.get(path)]
-        found = (Asset(path.relative_to(folder).as_posix(), prepared[path].stem) for path in remark_of)
-        return tuple(sorted(found, key=lambda asset: asset.sha256))
+        return {prepared[path].stem: path.relative_to(folder).as_posix() for path in remark_of}
 
     def _originals(self, folder: Path, skipped: list[str]) -> dict[str, Path]:
         """The files worth preparing by the SHA-256 that names them in the store; of equal ones the first."""
@@ -243,12 +226,14 @@ class _FolderImport:
         available = available_memory_bytes()
         fitting = available // (self.limits.memory_bytes or available)
         workers = max(1, min(len(jobs), len(os.sched_getaffinity(0)), fitting))
-        executor = LocalExecutor(({},) * workers, WorkerPolicy(self.limits, attempts=1))
+        executor = LocalExecutor(
+            ({},) * workers, WorkerPolicy(self.limits, attempts=1, jobs_per_worker=FILES_PER_WORKER)
+        )
         with closing(executor.run(partial(_prepare_file, self.prepare), jobs)) as outcomes:
             for outcome in outcomes:
                 failure = outcome.failure
                 if failure is not None and failure.kind in ("environment", "disk_full"):
-                    raise MachineError(f"importing stopped, no file is at fault: {failure.sentence}"[:300])
+                    raise MachineError(f"importing stopped, no file is at fault: {failure.sentence}")
                 if failure is not None:
                     yield outcome.job[0], _Outcome(f"cannot be read, {failure.sentence}")
                 else:
@@ -270,7 +255,7 @@ def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> _Outcome:
     except KeyError as error:
         return _Outcome(f"cannot be read (it has no {error})")
     except Exception as error:
-        return _Outcome(f"cannot be read ({' '.join(str(error).split())[:200] or type(error).__name__})")
+        return _Outcome(f"cannot be read ({shortened(str(error), 200) or type(error).__name__})")
     remark = arrays.get(REMARK)
     temporary = target.with_suffix(f".{os.getpid()}.tmp")
     with temporary.open("wb") as file:

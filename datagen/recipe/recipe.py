@@ -1,21 +1,33 @@
-"""The recipe of a data set: everything that decides its bytes, as a typed record and as `recipe.yaml`."""
+"""The recipe of a data set: everything that decides its bytes, as a typed record and as `recipe.yaml`.
+
+The user assets are listed in a file of their own beside it, `assets.json`, which the recipe names by its SHA-256.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from datagen.dataset.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS
+from datagen.dataset.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS, Layout
 from datagen.errors import DatasetError
 from datagen.formats.limits import MAX_ELEMENTS, read_bounded
+from datagen.recipe.asset_pool import (
+    ASSET_KINDS,
+    MAX_POOL_BYTES,
+    pool_difference,
+    pool_from_text,
+    pool_sha256,
+    pool_to_text,
+)
 from datagen.recipe.curation import Curation
 from datagen.recipe.disparity_histogram import DisparityHistogram, fit_components, with_depths
 from datagen.recipe.disparity_range import REACHED_PERCENT, with_disparity_at
@@ -24,15 +36,18 @@ from scenes.serialization import from_plain, to_plain
 from scenes.spec import OMIT_DEFAULT
 from scenes.user_assets.pool import AssetPool
 from stereoforge_kit.errors import InputError
-from stereoforge_kit.files import write_text
+from stereoforge_kit.files import Tree, write_text
+from stereoforge_kit.messages import shortened
 
 MAX_RECIPE_BYTES = 1 << 20
 """Largest recipe file that is read."""
 MAX_RECIPE_DEPTH = 32
 """Deepest nesting that a recipe file may have."""
 
-LONGEST_SETTING = 80
+LONGEST_SETTING = 60
 """Characters of a setting in a message."""
+LONGEST_REASON = 180
+"""Characters of what is wrong with a recipe's text."""
 LEAST_SIDE_PX = 4
 """Blender clamps the sides of a picture to this."""
 
@@ -141,7 +156,7 @@ class Recipe:
 
     def settings_sha256(self) -> str:
         """The SHA-256 of all settings but the numbers of scenes, which may grow."""
-        settings = to_plain(replace(self, scenes={}))
+        settings = recipe_to_plain(replace(self, scenes={}))
         return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
     def sample(self, split: str, index: int, attempt: int = 0) -> Scene:
@@ -183,26 +198,64 @@ def _check_names(what: str, names: tuple[str, ...], known: Collection[str]) -> N
             raise DatasetError(f"{what} name {name!r} {names.count(name)} times")
 
 
-def recipe_from_plain(data: Any, origin: str) -> Recipe:
-    """A recipe from parsed YAML. Raises DatasetError, naming `origin`, for anything that is not a recipe."""
+def recipe_from_plain(data: Any, origin: str, read_pool: Callable[[], bytes] | None = None) -> Recipe:
+    """A recipe from parsed YAML.
+
+    Args:
+        data: What `recipe_to_plain` gives.
+        origin: The file's name or another one, for messages.
+        read_pool: Gives the content of the recipe's `assets.json`, or raises FileNotFoundError; None if there
+            can be none.
+
+    Raises:
+        DatasetError: For anything that is not a recipe, and a pool that is not the one it names.
+    """
     if not isinstance(data, dict):
         raise DatasetError(f"{origin} is not a valid recipe: it has no settings, such as world: and scenes:")
+    assets, pool = data.get("assets"), AssetPool()
+    if isinstance(assets, dict) and any(map(assets.get, ASSET_KINDS)):
+        raise DatasetError(f"{origin} is not a valid recipe: it lists user assets itself, not in assets.json")
+    if isinstance(assets, dict) and "pool" in assets:
+        pool = _named_pool(str(assets["pool"]), origin, read_pool)
+        data = {**data, "assets": {key: value for key, value in assets.items() if key != "pool"}}
     try:
-        return from_plain(data, Recipe)
+        recipe = from_plain(data, Recipe)
+        return replace(recipe, assets=replace(pool, share=recipe.assets.share)) if pool else recipe
     except (ValueError, RecursionError) as error:
-        raise DatasetError(f"{origin} is not a valid recipe: {error}") from error
+        raise DatasetError(
+            f"{origin} is not a valid recipe: {shortened(str(error), LONGEST_REASON)}"
+        ) from error
 
 
-def recipe_from_text(text: bytes, origin: str) -> Recipe:
-    """A recipe from YAML text in UTF-8. Raises DatasetError, naming `origin`, for text that is no YAML or no recipe."""
+def _named_pool(sha256: str, origin: str, read_pool: Callable[[], bytes] | None) -> AssetPool:
+    """The pool that a recipe names. Raises DatasetError if there is none, or another one."""
+    try:
+        text = b"" if read_pool is None else read_pool()
+    except FileNotFoundError:
+        text = b""
+    if not text:
+        raise DatasetError(f"{origin} names a list of user assets, but there is no assets.json beside it")
+    if hashlib.sha256(text).hexdigest() != sha256:
+        raise DatasetError(
+            f"{origin}: the assets.json beside it is not the list of user assets that it names"
+        )
+    return pool_from_text(text, f"the assets.json of {origin}")
+
+
+def recipe_from_text(text: bytes, origin: str, read_pool: Callable[[], bytes] | None = None) -> Recipe:
+    """A recipe from YAML text in UTF-8; `read_pool` as in `recipe_from_plain`.
+
+    Raises DatasetError, naming `origin`, for text that is no YAML or no recipe.
+    """
     if len(text) > MAX_RECIPE_BYTES:
         raise DatasetError(f"cannot read the recipe {origin}: {len(text)} bytes are more than any recipe has")
     try:
         _check_shape(text.decode("utf-8"))
         data = yaml.safe_load(text.decode("utf-8"))
     except (UnicodeDecodeError, yaml.YAMLError, RecursionError, ValueError) as error:
-        raise DatasetError(f"cannot read the recipe {origin}: {_reason(error)}") from error
-    return recipe_from_plain(data, origin)
+        reason = shortened(_reason(error), LONGEST_REASON)
+        raise DatasetError(f"cannot read the recipe {origin}: {reason}") from error
+    return recipe_from_plain(data, origin, read_pool)
 
 
 def _reason(error: Exception) -> str:
@@ -222,19 +275,49 @@ def _check_shape(text: str) -> None:
 
 
 def read_recipe(path: Path) -> Recipe:
-    """Read a recipe file. Raises DatasetError for a file that is missing, no YAML or no recipe."""
+    """Read a recipe file, and the list of user assets beside it if it names one.
+
+    Raises DatasetError for a file that is missing, no YAML or no recipe.
+    """
     if not path.exists():
         raise DatasetError(f"there is no recipe {path}")
-    return recipe_from_text(read_bounded(path, MAX_RECIPE_BYTES), str(path))
+    return recipe_from_text(
+        read_bounded(path, MAX_RECIPE_BYTES), str(path), partial(_read_pool, Layout(path.parent).asset_pool)
+    )
+
+
+def recipe_in(tree: Tree) -> Recipe:
+    """The recipe of a data set in a folder or behind a URL. Raises DatasetError as `read_recipe` does."""
+    names = Layout(Path())
+    return recipe_from_text(
+        tree.read(names.recipe.name), f"{tree.name}/{names.recipe}", lambda: tree.read(names.asset_pool.name)
+    )
+
+
+def _read_pool(path: Path) -> bytes:
+    if not path.exists():
+        raise FileNotFoundError(path)
+    return read_bounded(path, MAX_POOL_BYTES)
+
+
+def recipe_to_plain(recipe: Recipe) -> dict[str, Any]:
+    """A recipe as dicts, lists, strings and numbers, which `recipe_from_plain` takes."""
+    plain: dict[str, Any] = to_plain(replace(recipe, assets=AssetPool()))
+    if recipe.assets:
+        share = {} if recipe.assets.share is None else {"share": recipe.assets.share}
+        plain["assets"] = {"pool": pool_sha256(recipe.assets), **share}
+    return plain
 
 
 def recipe_to_text(recipe: Recipe) -> str:
     """A recipe as YAML text, which `recipe_from_text` reads."""
-    return yaml.safe_dump(to_plain(recipe), sort_keys=False)
+    return yaml.safe_dump(recipe_to_plain(recipe), sort_keys=False)
 
 
 def write_recipe(path: Path, recipe: Recipe) -> None:
-    """Write a recipe file, which `read_recipe` reads."""
+    """Write a recipe file, which `read_recipe` reads, and before it the list of its user assets, if it has any."""
+    if recipe.assets:
+        write_text(Layout(path.parent).asset_pool, pool_to_text(recipe.assets))
     write_text(path, recipe_to_text(recipe))
 
 
@@ -243,12 +326,14 @@ def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
 
     Nothing else may change. Raises DatasetError, naming `folder` and the first setting that differs.
     """
-    before, after = (_flat(to_plain(replace(recipe, scenes={}))) for recipe in (existing, wanted))
-    # Another family has other settings altogether: name the family first.
+    before, after = (_flat(recipe_to_plain(replace(recipe, scenes={}))) for recipe in (existing, wanted))
+    # Another family has other settings altogether: name the family first, and the user assets by their files.
     for key in sorted(set(before) | set(after), key=lambda key: (key != "world.family", key)):
         if before.get(key) != after.get(key):
+            files = pool_difference(existing.assets, wanted.assets) if key.startswith("assets.") else None
+            settings = f"{key} {_brief(before.get(key))}, not {_brief(after.get(key))}"
             raise DatasetError(
-                f"{folder} was rendered with {key} {_brief(before.get(key))}, not {_brief(after.get(key))}: "
+                f"{folder} was rendered with {f'other user assets, there are now {files}' if files else settings}: "
                 "use the same settings to finish or extend it, or another folder"
             )
     splits = [split for split in SPLITS if split in existing.scenes or split in wanted.scenes]
@@ -257,11 +342,8 @@ def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
 
 
 def _brief(value: Any) -> str:
-    """A setting for a sentence: of many user assets only how many they are."""
-    text = str(value)
-    if len(text) <= LONGEST_SETTING:
-        return text
-    return f"({len(value)} entries)" if isinstance(value, list) else f"{text[: LONGEST_SETTING - 3]}..."
+    """A setting for a sentence."""
+    return shortened(str(value), LONGEST_SETTING)
 
 
 def _flat(data: Any, prefix: str = "") -> dict[str, Any]:

@@ -24,7 +24,7 @@ from datagen.dataset.manifest import SceneManifest, read_manifest
 from datagen.dataset.samples import StereoSample, opened_layout
 from datagen.errors import DatasetError
 from datagen.formats import write_png
-from datagen.recipe.recipe import Recipe, recipe_from_text
+from datagen.recipe.recipe import Recipe, recipe_in
 from datagen.rendering.staging import StagingArea
 from scenes import FAMILIES
 from stereoforge_kit.files import Tree
@@ -32,6 +32,8 @@ from stereoforge_kit.files import Tree
 T = TypeVar("T")
 
 CARD, PICTURE, LICENSES = "README.md", "card.png", "LICENSES.md"
+MOST_FILES = 100
+"""User assets that a card lists."""
 MARK = "<!-- Written by stereoforge render, which replaces it; without this line it stays as it is. -->\n"
 """The first line of a card."""
 MEASURED_SCENES = 200
@@ -86,8 +88,7 @@ def _adopt(tree: Tree, staged: Path) -> None:
 
 def compose_card(tree: Tree) -> Card:
     """The card of a data set. Scenes that are damaged do not count. Raises DatasetError for a damaged recipe."""
-    name = Layout(Path()).recipe.name
-    recipe = recipe_from_text(tree.read(name), f"{tree.name}/{name}")
+    recipe = recipe_in(tree)
     with opened_layout(tree.name) as layout:
         scenes = {split: layout.committed_scenes(split) for split in SPLITS}
         manifests = {split: list(_manifests(layout, split, numbers)) for split, numbers in scenes.items()}
@@ -244,7 +245,9 @@ def _licenses(recipe: Recipe, notes: str | None) -> str:
             for asset in assets
         ]
         text += "\nFiles of the user's that the worlds are made with:\n\n| kind | file | SHA-256 |\n|---|---|---|\n"
-        text += "\n".join(rows) + "\n"
+        text += "\n".join(rows[:MOST_FILES]) + "\n"
+        if len(rows) > MOST_FILES:
+            text += f"\nAnd {len(rows) - MOST_FILES} more, which `assets.json` lists.\n"
         if notes is None:
             text += f"\nTheir licences: write them into `{LICENSES}` beside this file; the next run takes them over.\n"
     return text if notes is None else f"{text}\n{notes.strip()}\n"

@@ -67,8 +67,8 @@ def check_disparity_range(recipe: Recipe) -> None:
     low, high = curation.disparity_px
     raise DatasetError(
         f"worlds of {recipe.family} do not keep within disparities of {low:g} to {high:g} px at {recipe.world.width}x"
-        f"{recipe.world.height}: of {curation.attempts} drawn, the best has {least:.0%} of its surfaces outside, where "
-        f"{curation.max_outside:.0%} may be, and spans {spread[0]:.0f} to {spread[1]:.0f} px; ask for a wider range"
+        f"{recipe.world.height}: the best of {curation.attempts} has {least:.0%} of its surfaces outside and spans "
+        f"{spread[0]:.0f} to {spread[1]:.0f} px; ask for a wider range"
     )
 
 

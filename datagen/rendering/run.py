@@ -15,7 +15,8 @@ from datagen.dataset.manifest import SceneManifest
 from datagen.errors import DatasetError, DiskFullError, MachineError
 from datagen.executors import Executor, LocalExecutor, Outcome, RayExecutor, WorkerPolicy
 from datagen.executors.devices import assign_devices, find_gpus
-from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_from_text, write_recipe
+from datagen.recipe.asset_pool import require_assets
+from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_in, write_recipe
 from datagen.rendering.card import update_card
 from datagen.rendering.preflight import NO_BLENDER, check_device, check_disparity_range, has_blender
 from datagen.rendering.quarantine import (
@@ -41,7 +42,6 @@ SCENE_TIMEOUT_S = 1800.0
 """How long one scene may take by default."""
 MEMORY_SHARE = 0.8
 """Share of the machine's memory that all workers together may use."""
-LONGEST_SENTENCE = 300
 NO_ROOM_BYTES = 16 << 20
 """With less room than this a failure is put down to the full disk: Blender does not say so itself."""
 
@@ -282,7 +282,7 @@ def _machine_sentence(failure: str) -> str:
     """What stops a run, for a person."""
     if "No module named 'bpy'" in failure:
         return NO_BLENDER
-    return f"rendering stopped, no scene is at fault: {failure}"[:LONGEST_SENTENCE]
+    return f"rendering stopped, no scene is at fault: {failure}"
 
 
 def _check_possible(
@@ -303,24 +303,25 @@ def _check_possible(
 
 def _merge(tree: Tree, recipe: Recipe) -> Recipe:
     """The recipe that the folder will have: the one that is there, if any, with the scenes that `recipe` adds."""
-    name = Layout(Path()).recipe.name
-    if tree.exists(name):
-        existing = recipe_from_text(tree.read(name), f"{tree.name}/{name}")
-        return merge_into(existing, recipe, tree.name)
-    if tree.files_in(""):
+    names = Layout(Path())
+    if tree.exists(names.recipe.name):
+        return merge_into(recipe_in(tree), recipe, tree.name)
+    if set(tree.files_in("")) - {
+        names.asset_pool.name
+    }:  # It is written first, so a run may have ended after it.
         raise DatasetError(f"{tree.name} is neither empty nor a data set; give a new or empty folder")
     return recipe
 
 
 def check_store(tree: Tree, recipe: Recipe) -> None:
-    """Raise DatasetError unless the user assets that a recipe names are in the data set's store."""
-    pool = recipe.assets
-    if not pool:
+    """Raise DatasetError unless each split has user assets, and all of them are in the data set's store."""
+    if not recipe.assets:
         return
+    require_assets(recipe.assets, (split for split, count in recipe.scenes.items() if count))
     if not isinstance(tree, LocalTree):
         raise DatasetError(f"{tree.name}: a recipe with user assets needs a folder, not a URL")
     store = Layout(tree.root).assets
-    for asset in (*pool.meshes, *pool.textures, *pool.environments):
+    for asset in recipe.assets.files:
         prepared = store / f"{asset.sha256}.npz"
         if not prepared.is_file() or not is_zipfile(prepared):
             raise DatasetError(
@@ -333,8 +334,9 @@ def _write_recipe(tree: Tree, area: StagingArea, recipe: Recipe) -> None:
     """Write the recipe by way of the staging area, so that a killed run leaves no temporary file."""
     staged = Layout(area.folder).recipe
     write_recipe(staged, recipe)
-    if not tree.exists(staged.name) or tree.read(staged.name) != staged.read_bytes():
-        tree.adopt(staged, staged.name)
+    for path in (Layout(area.folder).asset_pool, staged):
+        if path.exists() and (not tree.exists(path.name) or tree.read(path.name) != path.read_bytes()):
+            tree.adopt(path, path.name)
 
 
 def committed_scenes(tree: Tree) -> set[SceneKey]:

@@ -186,8 +186,7 @@ def _assets_used(recipe: Recipe, scene: Scene) -> list[str]:
         scene.world.environment,
     )
     used = {item.sha256 for item in candidates if isinstance(item, UserMesh | UserTexture | UserEnvironment)}
-    pool = recipe.assets
-    return sorted(a.name for a in (*pool.meshes, *pool.textures, *pool.environments) if a.sha256 in used)
+    return sorted(asset.name for asset in recipe.assets.files if asset.sha256 in used)
 
 
 def _commit(job: SceneJob, staging: Path, watch: Stopwatch, statistics: dict[str, Any]) -> SceneManifest:

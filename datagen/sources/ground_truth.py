@@ -10,6 +10,7 @@ import numpy as np
 from datagen.errors import DatasetError
 from datagen.formats.impossible_disparity import ImpossibleShare
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
+from stereoforge_kit.messages import shortened
 
 _NAMED = 3
 """Files that a message names."""
@@ -59,4 +60,4 @@ def _shown(location: str, frame: StereoFrame) -> str:
     else:
         root = Path(location.partition("#")[0])
         name = path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)
-    return name if len(name) <= _LONGEST_NAME else f"...{name[-_LONGEST_NAME:]}"
+    return shortened(name, _LONGEST_NAME)

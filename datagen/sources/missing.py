@@ -10,6 +10,7 @@ from typing import overload
 from datagen.dataset.remote_cache import RemoteLayout
 from datagen.dataset.samples import StereoSample
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
+from stereoforge_kit.messages import shortened
 
 _NAMED = 3
 """Files that a message names."""
@@ -68,4 +69,4 @@ def _files(frame: StereoFrame) -> tuple[Path, ...]:
 
 def _shown(path: Path, root: Path) -> str:
     name = path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)
-    return name if len(name) <= _LONGEST_NAME else f"...{name[-_LONGEST_NAME:]}"
+    return shortened(name, _LONGEST_NAME)

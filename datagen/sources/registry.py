@@ -60,9 +60,7 @@ class DataSource:
             raise DatasetError(f"{self.location}: {self.format.title} has no split {split!r}")
         frames = self.format.find_frames(self.location, split)
         if not len(frames):
-            raise DatasetError(
-                f"{self.location}: has no frame with ground truth in the layout of {self.format.title}"
-            )
+            raise DatasetError(f"{self.location}: {self._nothing(split)}")
         if self.selection is None:
             return frames
         first, last = self.selection
@@ -71,6 +69,15 @@ class DataSource:
                 f"{self.location}: frames {first} to {last} were asked for, it has {len(frames)} (from 0)"
             )
         return frames[first : last + 1]
+
+    def _nothing(self, split: str) -> str:
+        """What to say of a set without a frame in a split: that others have some, or that none has."""
+        others = (each for each in self.format.splits if each != split)
+        counts = {each: len(self.format.find_frames(self.location, each)) for each in others}
+        present = " and ".join(f"{count} {each}" for each, count in counts.items() if count)
+        if present:
+            return f"has no {split} frames; there are {present}"
+        return f"has no frame with ground truth in the layout of {self.format.title}"
 
     def validation_frames(self) -> Sequence[StereoFrame]:
         """The frames of the set's own validation split, empty if it has none."""
@@ -123,7 +130,11 @@ def _existing(location: str, pattern_allowed: bool = False) -> str:
         return location
     found = location if Path(location).exists() else with_home(location)
     if not Path(found).exists() and not (pattern_allowed and _PATTERN.search(location)):
-        raise DatasetError(f"{found}: there is no such {'file' if found.endswith('.tar') else 'folder'}")
+        what = "file" if found.endswith(".tar") else "folder"
+        hint = (
+            f"; of shards write webdataset:{location}" if what == "file" and _PATTERN.search(location) else ""
+        )
+        raise DatasetError(f"{found}: there is no such {what}{hint}")
     return found
 
 

@@ -104,7 +104,7 @@ def _run(checks: list[SceneCheck], workers: int | None) -> Iterator[SceneCheck]:
                 yield outcome.result
             else:
                 if outcome.failure.kind == "environment":
-                    raise MachineError(f"checking stopped: {outcome.failure.sentence}"[:300])
+                    raise MachineError(f"checking stopped: {outcome.failure.sentence}")
                 outcome.job.could_not_run(outcome.failure.sentence)
                 yield outcome.job
 

@@ -22,6 +22,7 @@ from datagen.recipe.recipe import Recipe
 from datagen.verify.frame_check import FrameCheck
 from datagen.verify.report import Problem
 from scenes import Scene
+from scenes.user_assets.pool import UserMesh
 from stereoforge_kit.errors import InputError
 
 SAMPLED_PIXELS = 500
@@ -81,6 +82,9 @@ class SceneCheck:
         if not self.sampled_pixels:
             return None
         try:
+            for shape in (thing.shape for thing in scene.objects):
+                if isinstance(shape, UserMesh):
+                    self.layout.local(self.layout.assets / f"{shape.sha256}.npz")
             return SceneRayCaster(build_geometry(scene))
         except InputError as error:
             record = self.layout.scene_record(self.split, self.scene)

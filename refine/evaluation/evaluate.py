@@ -19,6 +19,7 @@ from refine.method import EvaluationFrame, Method
 from refine.metrics import SparsificationCurve, bad_pixel_rate, optimal_auc, sparsification_curve
 from refine.registry import default_methods
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.messages import listed
 
 __all__ = [
     "Evaluation",
@@ -160,7 +161,7 @@ class _Run:
     def __init__(self, methods: tuple[Method, ...], options: EvaluationOptions) -> None:
         names = [method.name for method in methods]
         if len(set(names)) != len(names):
-            raise InputError(f"every method may be evaluated once, got {', '.join(names)}")
+            raise InputError(f"every method may be evaluated once, got {listed(names)}")
         self.methods = methods
         self.options = options
         self.skipped: dict[str, str] = {}
@@ -219,7 +220,9 @@ class _Run:
         }
         self.methods = tuple(method for method in self.methods if method.name not in self.skipped)
         if not self.methods:
-            raise InputError(f"no method can run: {'; '.join(self.skipped.values())}")
+            raise InputError(
+                f"no method can run: {listed([*self.skipped.values()], most=2, longest=110, separator='; ')}"
+            )
         self.pools = {method.name: self._empty_pool() for method in self.methods}
         self.judged = "ours" if "ours" in self.pools else self.methods[0].name
 

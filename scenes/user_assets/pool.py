@@ -10,6 +10,8 @@ from __future__ import annotations
 import re
 import struct
 import zlib
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
@@ -24,6 +26,9 @@ from stereoforge_kit.errors import InputError
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _stores: list[Path] = []
+
+LEAST_FILES = {"train": 1, "test": 2, "val": 3}
+"""How many files of a kind there must be for a split to have one, by the split."""
 
 
 class AssetStoreError(InputError):
@@ -62,35 +67,47 @@ def _load(sha256: str) -> dict[str, NDArray[np.generic]]:
 
 @dataclass(frozen=True)
 class Asset:
-    """One of the user's files. Raises ValueError for a hash that is none."""
+    """One of the user's files. Raises ValueError for a hash or a split that is none."""
 
     name: str
     """Its file name, for messages."""
     sha256: str
     """SHA-256 of its bytes, 64 hexadecimal digits."""
+    split: str
+    """The one split that may use it."""
 
     def __post_init__(self) -> None:
         _check_sha256(self.sha256)
+        if self.split not in LEAST_FILES:
+            raise InputError(f"a user's file is for one of {', '.join(LEAST_FILES)}, not {self.split[:80]!r}")
 
 
-def spread_over_splits(assets: tuple[Asset, ...]) -> dict[str, tuple[Asset, ...]]:
-    """The files of one kind that each split may use: about 80 % train, 10 % val, 10 % test, by their content.
+def spread_over_splits(names: Mapping[str, str], known: Iterable[Asset] = ()) -> tuple[Asset, ...]:
+    """The files of one kind, each with its split: about 80 % train, 10 % val, 10 % test.
 
-    A file's split follows from its SHA-256 alone, unless that leaves a split without any, as it often does with a few
-    files. Then each split gets its share of the files in the order of their SHA-256, and at least one. A single file is
-    for train, and the second is for test.
+    A file that is known keeps its split, so that a pool that grows never shows in test what was trained on. The split
+    of a new one follows from its SHA-256 alone, unless that leaves a split without any, as it often does with a few
+    files. Then the split that has most gives a new one away. A single file is for train, and the second is for test.
+
+    Args:
+        names: The files' names by their SHA-256.
+        known: Files whose splits are decided; those that are not among `names` are left out.
     """
-    by_content: dict[str, list[Asset]] = {"train": [], "val": [], "test": []}
-    for asset in assets:
-        share = int(asset.sha256[:8], 16) / 2**32
-        by_content["train" if share < 0.8 else "val" if share < 0.9 else "test"].append(asset)
-    if all(by_content.values()):
-        return {split: tuple(files) for split, files in by_content.items()}
-    ordered = tuple(sorted(assets, key=lambda asset: asset.sha256))
-    test = max(1, round(0.1 * len(ordered))) if len(ordered) > 1 else 0
-    val = max(1, round(0.1 * len(ordered))) if len(ordered) > 2 else 0
-    train = len(ordered) - val - test
-    return {"train": ordered[:train], "val": ordered[train : train + val], "test": ordered[train + val :]}
+    splits = {asset.sha256: asset.split for asset in known if asset.sha256 in names}
+    new = sorted(names.keys() - splits.keys())
+    splits |= {sha256: _split_by_content(sha256) for sha256 in new}
+    needs = {split: int(len(splits) >= least) for split, least in LEAST_FILES.items()}
+    for needy, least in needs.items():
+        counts = Counter(splits.values())
+        spare = [sha256 for sha256 in new if counts[splits[sha256]] > needs[splits[sha256]]]
+        if counts[needy] < least and spare:
+            splits[max(spare, key=lambda sha256: counts[splits[sha256]])] = needy
+    return tuple(Asset(names[sha256], sha256, splits[sha256]) for sha256 in sorted(names))
+
+
+def _split_by_content(sha256: str) -> str:
+    share = int(sha256[:8], 16) / 2**32
+    return "train" if share < 0.8 else "val" if share < 0.9 else "test"
 
 
 @dataclass(frozen=True)
@@ -110,12 +127,19 @@ class AssetPool:
             )
 
     def __bool__(self) -> bool:
-        return bool(self.meshes or self.textures or self.environments)
+        return bool(self.files)
+
+    @property
+    def files(self) -> tuple[Asset, ...]:
+        """The files of all kinds."""
+        return (*self.meshes, *self.textures, *self.environments)
 
     def of_split(self, split: str) -> AssetPool:
         """The files that a split may use."""
         kinds = (self.meshes, self.textures, self.environments)
-        meshes, textures, environments = (spread_over_splits(kind)[split] for kind in kinds)
+        meshes, textures, environments = (
+            tuple(asset for asset in kind if asset.split == split) for kind in kinds
+        )
         return AssetPool(meshes, textures, environments, self.share)
 
 

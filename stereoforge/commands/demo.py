@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.inputs.flag_values import shown
+from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console
 
 
@@ -26,6 +28,8 @@ class Demo:
 
     def run(self) -> None:
         """Run every stage and print the main numbers and where the report is."""
+        keep_apart("--out", self.out, "the bundled weights", BUNDLED_WEIGHTS)
+        check_writable("--out", self.out)
         from stereoforge.pipelines.demo import run_demo, summary_table
 
         result = run_demo(self.out, device=self.device)
@@ -37,5 +41,4 @@ class Demo:
             f"  report of the evaluation   {result.report}\n"
             f"  the data set               {result.data}\n"
             f"  the networks               {result.weights}",
-            markup=False,
         )

@@ -13,8 +13,9 @@ import tyro
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS, named_weights
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import check_max_disparity, parse_methods, several, shown
-from stereoforge.places import keep_apart
-from stereoforge.progress import console
+from stereoforge.places import check_writable, keep_apart
+from stereoforge.progress import console, remark
+from stereoforge_kit.messages import listed
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,9 @@ class Evaluate:
             keep_apart("--out", self.out, "the data set", source)
             if self.submission is not None:
                 keep_apart("--submission", self.submission, "the data set", source)
+        check_writable("--out", self.out)
+        if self.submission is not None:
+            check_writable("--submission", self.submission)
         from stereoforge.pipelines.prediction import (
             fallback_notes,
             open_predictors,
@@ -100,7 +104,7 @@ class Evaluate:
         lacking = untrained(rows, run, self.predictor)
         notes = untrained_notes(lacking, run, self.predictor)
         if len(lacking) == len(rows):
-            raise CommandError("; ".join(notes))
+            raise CommandError(listed(notes, most=2, longest=130, separator="; "))
         sets = [
             evaluate_set(
                 each,
@@ -120,11 +124,11 @@ class Evaluate:
             notes += fallback_notes(run)
         skipped = sets[0].evaluation.skipped
         for note in (*notes, *(reason for name, reason in skipped.items() if name not in lacking)):
-            console.print(note, markup=False, soft_wrap=True)
+            remark(note)
         frames = ", ".join(f"{len(each.evaluation.frames)} of {each.name}" for each in sets)
-        console.print(f"{files.html}: frames evaluated: {frames}", markup=False)
+        console.print(f"{files.html}: frames evaluated: {frames}")
         if self.submission and submission:
             count = write_submission(submission, predictors, settings.ours, self.submission)
-            console.print(f"{self.submission}: {count} disparities", markup=False)
+            console.print(f"{self.submission}: {count} disparities")
             if submission.note:
-                console.print(submission.note, markup=False, soft_wrap=True)
+                remark(submission.note)

@@ -14,9 +14,9 @@ from datagen.export import EXPORTERS, ExportOptions, left_out
 from datagen.export.folder import export_folder, export_record
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import shown
-from stereoforge.places import keep_apart
-from stereoforge.progress import console, progress_bar
-from stereoforge_kit.files import is_within, open_tree
+from stereoforge.places import check_writable, keep_apart
+from stereoforge.progress import console, progress_bar, remark
+from stereoforge_kit.files import LocalTree, is_within, open_tree
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,8 @@ class Export:
         keep_apart("--out", self.out, "the data set", self.data)
         if is_within(self.data, self.out):
             raise UsageError("--out holds the data set that is exported: write to a folder beside it")
+        if isinstance(out, LocalTree):
+            check_writable("--out", out.root)
         sets = [
             StereoDataset(self.data, split, self.render_pass)
             for split in SPLITS
@@ -78,4 +80,4 @@ class Export:
         console.print(f"{self.out}: {sum(map(len, sets))} frames as {self.format}")
         for sentence in (left_out(self.format, sets[0]), *(remarks or ())):
             if sentence:
-                console.print(sentence, markup=False, soft_wrap=True)
+                remark(sentence)

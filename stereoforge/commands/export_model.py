@@ -10,6 +10,7 @@ import tyro
 
 from stereoforge.bundled_weights import named_weights
 from stereoforge.inputs.flag_values import check_max_disparity, shown
+from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console
 
 
@@ -33,15 +34,16 @@ class ExportModel:
 
     def run(self) -> None:
         """Write the ONNX file and compare its results with torch's."""
+        check_max_disparity(self.max_disparity)
+        run = named_weights(self.run_folder)
+        keep_apart("--out", self.out, "RUN", run)
+        check_writable("--out", self.out)
         from training.prediction.onnx_export import export_model
         from training.runs.model_card import write_model_card
 
-        check_max_disparity(self.max_disparity)
-        run = named_weights(self.run_folder)
         exported = export_model(run, self.out, self.device, self.max_disparity)
         write_model_card(run, self.out)
         console.print(
             f"{exported.path}: {', '.join(exported.outputs)}; onnxruntime agrees with torch to "
             f"{exported.largest_difference:.1g}",
-            markup=False,
         )

@@ -16,8 +16,8 @@ from stereoforge.inputs.flag_values import check_max_disparity, shown
 from stereoforge.inputs.images import pair_doubts, read_color_images
 from stereoforge.inputs.picture_pairs import PicturePair, find_pairs
 from stereoforge.inputs.results_folder import claim_results
-from stereoforge.places import keep_apart
-from stereoforge.progress import console, progress_bar
+from stereoforge.places import check_writable, keep_apart
+from stereoforge.progress import console, progress_bar, remark
 
 if TYPE_CHECKING:
     from stereoforge.pipelines.refiner import RefinedPair, StereoRefiner
@@ -104,12 +104,13 @@ class Refine:
         )
         for note in (found.note, *refiner.notes):
             if note:
-                console.print(note, markup=False)
+                remark(note)
         if not found.pairs[0].name:
             with console.status("refining; the first time after an install this compiles for a minute"):
                 said = self._refine(refiner, found.pairs[0])
-            for line in said:
-                console.print(line, markup=False)
+            for line in said[:-1]:
+                remark(line)
+            console.print(said[-1], markup=False)
             return
         self._refine_all(refiner, found.pairs)
 
@@ -121,7 +122,7 @@ class Refine:
             task = progress.add_task("refining", total=len(pairs), completed=len(pairs) - len(left))
             for pair in left:
                 for line in self._refine(refiner, pair)[:-1]:
-                    console.print(f"{pair.name}: {line}", markup=False)
+                    remark(f"{pair.name}: {line}")
                 progress.advance(task)
         console.print(
             f"{self.out}: {len(left)} pairs refined, {len(pairs) - len(left)} were there already",
@@ -176,6 +177,7 @@ class Refine:
             keep_apart("--out", self.out / name, "RIGHT", self.right)
             keep_apart("--out", self.out / name, "--disparity", self.disparity)
             keep_apart("--out", self.out / name, "--disparity-right", self.disparity_right)
+        check_writable("--out", self.out)
 
     def _write(self, out: Path, left: NDArray[np.uint8], refined: RefinedPair) -> None:
         from datagen.formats import write_gradient, write_pfm, write_png

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from rich.markup import escape
 from rich.table import Table
 
 from datagen import DatasetError, Recipe, RenderSummary, read_recipe, render_dataset
@@ -14,24 +13,19 @@ from datagen.cameras.registry import read_calibration
 from datagen.dataset.layout import EXTRA_TARGETS, Layout
 from datagen.dataset.manifest import SceneManifest
 from datagen.executors import Executor
-from datagen.recipe.assets import (
-    ImportedAssets,
-    copy_prepared,
-    describe_splits,
-    import_assets,
-    prepared_assets_folder,
-    require_assets,
-)
+from datagen.recipe.asset_pool import ASSET_KINDS, describe_splits, require_assets
+from datagen.recipe.assets import ImportedAssets, copy_prepared, import_assets, prepared_assets_folder
 from datagen.recipe.recipe import fit_disparities
 from datagen.rendering.estimate import estimate_run
 from datagen.rendering.quarantine import QuarantinedScene, quarantined_scenes
 from datagen.rendering.run import SCENE_TIMEOUT_S, local_executor, ray_executor
 from scenes import FAMILIES, FamilyConfig
+from scenes.user_assets.pool import AssetPool
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_histogram, parse_range, parse_shard, parse_size, shown
 from stereoforge.pipelines.rendering import choose_device
 from stereoforge.places import keep_apart
-from stereoforge.progress import console, progress_bar
+from stereoforge.progress import console, progress_bar, remark
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import open_tree
 from stereoforge_kit.viewing import duration
@@ -160,21 +154,25 @@ class Render:
         if "://" in self.out:
             raise UsageError("--meshes, --textures and --environments need a folder for --out, not a URL")
         with prepared_assets_folder() as store:
-            imported = self._import(store)
+            present = Layout(Path(self.out)).recipe
+            known = read_recipe(present).assets if present.is_file() else recipe.assets
+            imported = self._import(store, known)
             for sentence in imported.skipped:
-                console.print(f"skipped {sentence}", markup=False)
+                remark(f"skipped {sentence}")
             for sentence in (*imported.remarks, *describe_splits(imported.pool)):
-                console.print(sentence, markup=False)
+                remark(sentence)
             try:
-                require_assets(imported.pool, recipe.scenes)
-                recipe = replace(recipe, assets=replace(imported.pool, share=self.own_share))
+                require_assets(imported.pool, (split for split, count in recipe.scenes.items() if count))
+                given = {kind: getattr(imported.pool, kind) for kind in ASSET_KINDS if getattr(self, kind)}
+                share = self.own_share or recipe.assets.share
+                recipe = replace(recipe, assets=replace(recipe.assets, **given, share=share))
             except DatasetError as error:
                 raise UsageError(str(error)) from error
             render_dataset(replace(recipe, scenes={}), self.out)  # Claims the folder, or refuses it.
             copy_prepared(imported.pool, store, Layout(Path(self.out)).assets)
         return recipe
 
-    def _import(self, store: Path) -> ImportedAssets:
+    def _import(self, store: Path, known: AssetPool) -> ImportedAssets:
         with progress_bar() as progress:
             task = progress.add_task("preparing your files", total=None)
             return import_assets(
@@ -183,6 +181,7 @@ class Render:
                 textures=self.textures,
                 environments=self.environments,
                 up_axis=self.up_axis,
+                known=known,
                 progress=lambda kind, done, total: progress.update(
                     task, completed=done, total=total, description=f"preparing {kind}"
                 ),
@@ -312,5 +311,5 @@ def _failure_table(failures: tuple[QuarantinedScene, ...]) -> Table:
     for heading in ("scene", "what happened", "attempts"):
         table.add_column(heading, overflow="fold")
     for entry in failures:
-        table.add_row(entry.name, escape(entry.reason), str(entry.attempts))
+        table.add_row(entry.name, entry.reason, str(entry.attempts))
     return table

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from scenes import FAMILIES
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import parse_counts, parse_methods, parse_size, shown
-from stereoforge.places import keep_apart
+from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ class Study:
         plan = self._plan()
         for domain in plan.domains.values():
             keep_apart("--out", self.out, "the domain", domain.source)
+        check_writable("--out", self.out)
         from stereoforge.study import run_study
         from training.devices import parse_device
 
@@ -69,10 +70,8 @@ class Study:
         for gap in result.gaps:
             shares = ", ".join(f"{name} {share:.0%}" for name, share in gap.shares.items() if share == share)
             if shares:
-                console.print(
-                    f"{gap.domain}, {gap.measure}: of a gap of {gap.size:.3g}, {shares}", markup=False
-                )
-        console.print(f"{result.report}", markup=False)
+                console.print(f"{gap.domain}, {gap.measure}: of a gap of {gap.size:.3g}, {shares}")
+        console.print(f"{result.report}")
 
     def _plan(self) -> StudyPlan:
         from stereoforge.study import DomainPlan, StudyPlan, read_plan

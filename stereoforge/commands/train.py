@@ -10,7 +10,7 @@ import tyro
 
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import parse_size, parse_weighted_source, several, shown
-from stereoforge.places import keep_apart
+from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console
 from stereoforge_kit.files import write_bytes
 
@@ -120,6 +120,7 @@ class Train:
             self.task == "regressor"
         ):  # Others add to the run folder; this one would replace what it starts from.
             keep_apart("--out", self.out, "--init", self.init)
+        check_writable("--out", self.out)
         if self.task == "rdf":
             self._train_forest([source for source, _ in data])
             return
@@ -189,7 +190,6 @@ class Train:
         forest = train_forest(data, self.out, PLANS[self.preset], self.seed, self.device)
         console.print(
             f"{forest_file(self.out)}: {len(forest.roots)} trees of {len(forest.feature)} nodes in all",
-            markup=False,
         )
 
     def _changes(self) -> dict[str, Any]:

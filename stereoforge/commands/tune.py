@@ -10,8 +10,9 @@ import tyro
 
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_methods, several, shown
-from stereoforge.places import keep_apart
-from stereoforge.progress import console
+from stereoforge.places import check_writable, keep_apart
+from stereoforge.progress import console, remark
+from stereoforge_kit.messages import listed
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class Tune:
         if self.out is not None:
             for source in self.data:
                 keep_apart("--out", self.out, "the data set", source)
+            check_writable("--out", self.out.parent)
         methods = parse_methods(self.methods)
         from rich.table import Table
 
@@ -73,7 +75,10 @@ class Tune:
         lacking = untrained(asked, self.weights, self.predictor)
         notes = untrained_notes(lacking, self.weights, self.predictor)
         if len(lacking) == len(asked):
-            raise CommandError("; ".join(notes) or f"{', '.join(methods)}: there is nothing to tune")
+            raise CommandError(
+                listed(notes, most=2, longest=130, separator="; ")
+                or f"{listed(methods)}: there is nothing to tune"
+            )
         frames = validation_frames(sources, predictors, self.frames)
         out = parameters_file(self.weights, self.predictor) if self.out is None else self.out
         about = describe(frames, self.data, self.objective, network_digests(self.weights, self.predictor))
@@ -87,5 +92,5 @@ class Tune:
                 table.add_row(name, *values, shown_values(result.method))
         console.print(table)
         for note in notes:
-            console.print(note, markup=False, soft_wrap=True)
-        console.print(f"{out}: {len(tuned)} methods, validated on {len(frames)} frames", markup=False)
+            remark(note)
+        console.print(f"{out}: {len(tuned)} methods, validated on {len(frames)} frames")

@@ -100,7 +100,7 @@ class Verify:
             first, count = summary.failures[0], len(summary.failures)
             raise CommandError(
                 f"{self.data}: {count} scenes could not be rendered again and are as they were, {first.name} because: "
-                f"{first.reason}"[:300]
+                f"{first.reason}"
             )
 
 
@@ -113,6 +113,6 @@ def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
 
 def _print_problems(report: VerifyReport) -> None:
     for problem in report.problems[:PROBLEMS_SHOWN]:
-        console.print(f"  {problem}", markup=False)
+        console.print(f"  {problem}")
     if len(report.problems) > PROBLEMS_SHOWN:
         console.print(f"  and {len(report.problems) - PROBLEMS_SHOWN} more")

@@ -10,7 +10,7 @@ import tyro
 
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import shown
-from stereoforge.places import keep_apart
+from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console, progress_bar
 
 
@@ -38,6 +38,7 @@ class View:
             raise UsageError(f"--out {self.out} is a folder; it takes the file to write")
         keep_apart("--out", self.out, "the data set", self.data)
         keep_apart("--out", self.out, "--compare", self.compare)
+        check_writable("--out", self.out.parent)
         from datagen.gallery.comparison import write_comparison
         from datagen.gallery.page import write_gallery
 

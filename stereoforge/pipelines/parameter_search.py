@@ -170,9 +170,7 @@ class Tuning:
             return Settings()
         earlier = read_settings(self.out)
         if earlier.about.get("fingerprint") != self.about["fingerprint"]:
-            console.print(
-                f"{self.out}: was made on other frames or for another objective; it is replaced", markup=False
-            )
+            console.print(f"{self.out}: was made on other frames or for another objective; it is replaced")
             return Settings()
         return earlier
 

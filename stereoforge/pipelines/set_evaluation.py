@@ -21,7 +21,7 @@ from refine.method import Method
 from refine.report.write import ReportContext, ReportFiles, write_report
 from stereoforge.inputs.images import pair_doubts
 from stereoforge.pipelines.prediction import Predictors
-from stereoforge.progress import console, progress_bar
+from stereoforge.progress import progress_bar, remark
 from training.presets import TASKS
 from training.runs.weights import has_weights, read_summary
 
@@ -65,7 +65,7 @@ def open_test_data(sources: Sequence[str], split: str, *, skip_broken: bool = Fa
             if not skip_broken:
                 raise DatasetError(f"{source}: {sentence}; --skip-broken evaluates the other frames")
             facts["Left out"] = sentence
-            console.print(f"{name}: left out: {sentence}", markup=False, soft_wrap=True)
+            remark(f"{name}: left out: {sentence}")
             frames = ChosenFrames(frames, [i for i in range(len(frames)) if i not in missing])
         opened.append(TestData(name, frames, family, split, facts))
     return opened
@@ -118,19 +118,15 @@ def evaluate_set(
     facts = dict(data.facts)
     if impossible := mean_share(doubts.shares):
         facts["Ground truth"] = str(impossible)
-        console.print(f"{data.name}: {impossible}", markup=False, soft_wrap=True)
+        remark(f"{data.name}: {impossible}")
     if doubts.broken:
         facts["Damaged"] = (
             f"left out, since they cannot be read: {len(doubts.broken)} of {len(data.frames)} frames, first "
             f"{doubts.broken[0]}"
         )
-        console.print(f"{data.name}: {facts['Damaged']}", markup=False, soft_wrap=True)
+        remark(f"{data.name}: {facts['Damaged']}")
     for sentence, frames in doubts.pairs.items():
-        console.print(
-            f"{data.name}: {frames[0]}{f' and {len(frames) - 1} more' * (len(frames) > 1)}: {sentence}",
-            markup=False,
-            soft_wrap=True,
-        )
+        remark(f"{data.name}: {frames[0]}{f' and {len(frames) - 1} more' * (len(frames) > 1)}: {sentence}")
     return EvaluatedSet(data.name, evaluation, data.family, data.split, facts)
 
 

@@ -69,9 +69,7 @@ def run_jobs(jobs: Sequence[Job]) -> None:
     for job in missing:
         place = jobs.index(job) + 1
         left = duration((ahead - expected) * _pace(time.monotonic() - began, expected))
-        console.print(
-            f"step {place} of {len(jobs)}: {job.title}; about {left} left of the whole", markup=False
-        )
+        console.print(f"step {place} of {len(jobs)}: {job.title}; about {left} left of the whole")
         job.folder.mkdir(parents=True, exist_ok=True)
         job.run()
         write_text(job.folder / FINISHED, json.dumps(job.settings, indent=1, default=list) + "\n")

@@ -15,6 +15,7 @@ from refine.registry import default_methods
 from scenes import FAMILIES
 from stereoforge.errors import UsageError
 from stereoforge.pipelines.forest import PLANS
+from stereoforge_kit.messages import listed, shortened
 from training.presets import find_preset
 
 TRAINING_SPLITS = ("train", "val")
@@ -82,10 +83,10 @@ class StudyPlan:
             raise UsageError("a study needs at least one domain to train on and one to test on")
         for name in (*self.train, *self.test):
             if name not in self.domains:
-                raise UsageError(f"the study has no domain {name!r}; it has {', '.join(self.domains)}")
+                raise UsageError(f"the study has no domain {name!r}; it has {listed([*self.domains])}")
         for role in (self.train, self.test):
             if len(set(role)) != len(role):
-                raise UsageError(f"a domain is named twice in {', '.join(role)}")
+                raise UsageError(f"a domain is named twice in {listed(role)}")
         for name, domain in self.domains.items():
             if domain.source is None and name not in FAMILIES:
                 raise UsageError(f"there is no family {name}; there are {', '.join(FAMILIES)}")
@@ -155,7 +156,7 @@ def read_plan(path: Path) -> StudyPlan:
     except FileNotFoundError as error:
         raise UsageError(f"there is no plan {path}") from error
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise UsageError(f"cannot read the plan {path}: {' '.join(str(error).split())}") from error
+        raise UsageError(f"cannot read the plan {path}: {shortened(str(error), 150)}") from error
     try:
         return _CONVERTER.structure(data, StudyPlan)
     except UsageError as error:

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from stereoforge_kit.errors import InputError
+
 TEMPORARY_SUFFIX = ".tmp"
 
 
@@ -17,7 +19,11 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Parent folders are made. The name starts with a dot and ends in `TEMPORARY_SUFFIX`, so that what a
     killed process leaves is recognisable; process and thread in it keep two writers of one file apart.
+
+    Raises InputError for a device or a pipe: it would be gone, for every other program too.
     """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise InputError(f"{path}: is a device or a pipe, which no file may replace")
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}{TEMPORARY_SUFFIX}")
     try:

@@ -37,10 +37,10 @@ class JobProgress(Progress):
 
     def __init__(self, console: Console, *columns: str, transient: bool = False) -> None:
         super().__init__(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
-            *(TextColumn(column) for column in columns),
+            *(TextColumn(column, markup=False) for column in columns),
             TimeElapsedColumn(),
             TextColumn("gone,"),
             TimeRemainingColumn(),

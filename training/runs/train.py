@@ -72,7 +72,8 @@ def train(request: TrainingRequest) -> TrainingSummary:
         trainer = _trainer(plan, callbacks)
         trainer.fit(built.task, module, ckpt_path=checkpoint, weights_only=True)
         trainer.strategy.barrier()  # the first process writes what the others read now
-    return read_summary(request.out, written_networks(request.task)[0])
+    # The best weights may be those of a shorter run that this one continued.
+    return replace(read_summary(request.out, written_networks(request.task)[0]), steps=plan.steps)
 
 
 def _open_data(plan: RunPlan) -> tuple[list[Source], list[StereoFrame]]:

@@ -20,6 +20,7 @@ from safetensors import SafetensorError
 from torch import Tensor, nn
 
 from stereoforge_kit.files import write_bytes, write_text
+from stereoforge_kit.messages import listed, shortened
 from training.errors import TrainingError
 from training.networks import ConfNet, GradNet, HeadConfig, Regressor
 from training.networks.regressors.registry import find_regressor
@@ -209,7 +210,7 @@ def _load(run: Path, task: str, build: Callable[[Mapping[str, Any]], Network]) -
         training = _structure(description["training"], TrainingSummary)
     except (SafetensorError, RuntimeError, KeyError, ValueError, TypeError, TrainingError) as error:
         raise TrainingError(
-            f"{path}: does not hold the {task} that {description_path.name} describes ({_first_line(error)})"
+            f"{path}: does not hold the {task} that {description_path.name} describes ({shortened(str(error), 150)})"
         ) from error
     network.eval()
     return StoredNetwork(network, digest, description["regressor_sha256"], training)
@@ -247,8 +248,4 @@ def _structure(values: Any, kind: type[Any]) -> Any:
     try:
         return _CONVERTER.structure(values, kind)
     except (cattrs.BaseValidationError, cattrs.StructureHandlerNotFoundError) as error:
-        raise ValueError("; ".join(cattrs.transform_error(error))) from error
-
-
-def _first_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
+        raise ValueError(listed(cattrs.transform_error(error), most=3, longest=80, separator="; ")) from error

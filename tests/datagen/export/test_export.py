@@ -19,7 +19,7 @@ from datagen.dataset.manifest import file_entry, read_manifest, write_manifest
 from datagen.export import EXPORTERS, ExportOptions
 from datagen.export.kitti import encode_disparity, share_too_large, vehicle_numbers
 from datagen.export.lidar import lidar_mask
-from datagen.formats import read_camera_data
+from datagen.formats import read_camera_data, read_pfm, write_flow, write_pfm
 from datagen.sources.registry import open_source
 from datagen.verify.dataset_check import verify_dataset
 from scenes import sample_scene
@@ -299,6 +299,70 @@ def test_flow_and_the_like_are_carried_where_they_were_rendered(own_dataset: Pat
     copied = tmp_path / "sceneflow" / layout.relative(added[0])
     assert copied.read_bytes() == added[0].name.encode()
     assert not (tmp_path / "sceneflow/normals").exists()
+
+
+def add_motion(root: Path, split: str, scene: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Give a scene of two frames flow and disparity change, also of its last frame; both by the frame's number."""
+    layout, motion = Layout(root), {}
+    manifest = read_manifest(layout.manifest(split, scene))
+    height, width = read_pfm(layout.file("disparity", split, scene, "left", 6)).shape
+    added = []
+    for frame in (6, 7):
+        rng = np.random.default_rng(10 * scene + frame)
+        flow = rng.uniform(-40, 40, (height, width, 2)).astype(np.float32)
+        flow[0, :3] = ((np.nan, 0), (600, 0), (0, -512.5))
+        change = rng.uniform(-0.5, 0.5, (height, width)).astype(np.float32)
+        for kind, write, array in (
+            ("optical_flow", write_flow, flow),
+            ("disparity_change", write_pfm, change),
+        ):
+            path = layout.file(kind, split, scene, "left", frame, "into_future")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write(path, array)
+            added.append(file_entry(root, path))
+        motion[frame] = flow, change
+    write_manifest(layout.manifest(split, scene), replace(manifest, files=(*manifest.files, *added)))
+    return motion
+
+
+def test_kitti_scene_flow(own_dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Read as KITTI's devkit and the loaders of optical flow do, which pair the sorted files of each folder."""
+    motion = {scene: add_motion(own_dataset, "train", scene) for scene in (0, 1)}
+    export(own_dataset, "kitti", tmp_path / "out")
+    said = capsys.readouterr().out
+    assert "no flow of 512 px and more" in said
+    assert "2 of 6 frames are the last of their scenes" in said
+    folder = tmp_path / "out/training"
+    names = (folder / "frames.txt").read_text().splitlines()
+    assert [line.split()[1] for line in names] == [
+        f"TRAIN/A/000{scene}/000{f}" for f in (6, 7) for scene in (0, 1)
+    ]
+    samples = {sample.name: sample for sample in StereoDataset(own_dataset, "train")}
+    now, then, flows = (
+        sorted(folder.glob(pattern))
+        for pattern in ("image_2/*_10.png", "image_2/*_11.png", "flow_occ/*_10.png")
+    )
+    assert (len(now), len(then), len(flows)) == (4, 2, 2)
+    for scene, (first, second, flow_file) in enumerate(zip(now, then, flows, strict=False)):
+        for path, frame in ((first, 6), (second, 7)):
+            sample = samples[f"TRAIN/A/000{scene}/000{frame}"]
+            assert (cv2.imread(str(path))[..., ::-1] == sample.left).all()
+            right = folder / "image_3" / path.name
+            assert (cv2.imread(str(right))[..., ::-1] == sample.right).all()
+        raw = cv2.imread(str(flow_file), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)[..., ::-1].astype(np.float64)
+        flow, change = motion[scene][6]
+        valid = np.ones(raw.shape[:2], bool)
+        valid[0, :3] = False
+        assert (raw[..., 2] == valid).all()
+        assert (raw[~valid] == 0).all()
+        assert np.abs((raw[..., :2] - 2**15) / 64 - flow)[valid].max() <= 1 / 128 + 1e-6
+        disparity = samples[f"TRAIN/A/000{scene}/0006"].disparity_left
+        moved, known = read_kitti(folder / "disp_occ_1" / flow_file.name)
+        assert (known == (disparity > 0) & (disparity + change > 0)).all()
+        assert np.abs(moved - disparity - change)[known].max() <= 0.5 / 256 + 1e-4
+    assert not (tmp_path / "out/testing/flow_occ").exists()
+    (frames,) = [open_source(f"kitti2015:{tmp_path / 'out'}").frames("train")]
+    assert len(frames) == 4
 
 
 def test_the_share_that_kitti_cannot_store() -> None:

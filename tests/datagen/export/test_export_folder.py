@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from datagen.dataset.layout import Layout
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.cli import main
 from stereoforge_kit.files import LocalTree, is_within
 from tests.datagen.analytic_world import write_dataset
@@ -159,12 +160,15 @@ def test_no_command_writes_into_what_it_reads(
                 ("view", "other", "--compare", "set", "--out", f"{out}/gallery.html"),
                 ("study", "--train", "set", "--test", "set", "--out", out),
                 ("train", "regressor", "--data", "other", "--init", "set", "--out", out),
+                ("export-model", "set", "--out", out),
             ]
         for words in commands:
             code, said = run(capsys, *words)
             assert code == 2, (words, said)
             assert "which is only read" in said, (words, said)
             assert len(said) <= 300 + len("stereoforge: ")
+    code, said = run(capsys, "demo", "--out", str(BUNDLED_WEIGHTS / "demo"))
+    assert code == 2, said
     assert content(tmp_path) == before
 
 

@@ -190,3 +190,27 @@ def test_random_damage(tmp_path: Path, suffix: str) -> None:
             sentences.append(str(error))
     assert len(sentences) > 15
     assert all(str(path) in sentence and "\n" not in sentence for sentence in sentences)
+
+
+def test_a_reduced_picture_is_the_mean_over_white(tmp_path: Path) -> None:
+    """Colours that are hidden by transparency must not shine through, as they do when alpha is averaged apart."""
+    pixels = np.random.default_rng(0).integers(0, 256, (43, 90, 4), np.uint8)
+    pixels[:20, :, 3] = 0
+    path = tmp_path / "picture.png"
+    Image.fromarray(pixels, "RGBA").save(path)
+    whole = read_picture(path).astype(np.float64)
+    reduced = read_picture(path, longest_px=30)
+    assert reduced.shape == (14, 30, 3)
+    means = whole[:42, :90].reshape(14, 3, 30, 3, 3).mean(axis=(1, 3))
+    assert np.abs(reduced - means).max() <= 1
+    assert (reduced[:6] == 255).all()
+    assert read_picture(path, longest_px=50).shape == (43, 90, 3)
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.ppm", "a.bmp", "a.tif", "a.webp", "a.gif"])
+def test_every_picture_can_be_written_to(name: str, tmp_path: Path) -> None:
+    """Kernels are compiled for such arrays only: evaluating a set of JPEG files ended in numba's TypeError."""
+    Image.new("RGB", (6, 4), (10, 200, 30)).save(tmp_path / name)
+    image = read_picture(tmp_path / name)
+    assert image.flags.writeable
+    assert image.flags.c_contiguous

@@ -14,11 +14,16 @@ import numpy as np
 import OpenEXR
 import pytest
 import trimesh
+from PIL import Image
 
 from datagen import DatasetError, Recipe, StereoDataset, read_recipe, render_dataset
 from datagen.dataset.layout import Layout
 from datagen.dataset.manifest import read_manifest
 from datagen.dataset.shards import CACHE_VARIABLE
+from datagen.errors import FormatError
+from datagen.export import EXPORTERS, ExportOptions
+from datagen.formats.picture import read_picture
+from datagen.recipe.asset_pool import describe_splits, pool_to_text, require_assets
 from datagen.recipe.assets import (
     MAX_SIDE_PX,
     MAX_TRIANGLES,
@@ -26,20 +31,27 @@ from datagen.recipe.assets import (
     UpAxis,
     _FolderImport,
     copy_prepared,
-    describe_splits,
     import_assets,
     prepare_environment,
     prepare_mesh,
     prepare_texture,
-    require_assets,
 )
-from datagen.recipe.recipe import recipe_from_text, recipe_to_text
+from datagen.recipe.recipe import recipe_from_text, recipe_to_text, write_recipe
 from datagen.rendering.estimate import estimate_run
 from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, scene_from_json, scene_to_json
 from scenes.spec import SceneObject
-from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture, use_store
+from scenes.user_assets.pool import (
+    Asset,
+    AssetPool,
+    UserEnvironment,
+    UserMesh,
+    UserTexture,
+    spread_over_splits,
+    use_store,
+)
 from stereoforge.commands.render import Render
+from stereoforge_kit.files import LocalTree, open_tree
 from stereoforge_kit.processes import Limits
 
 RNG = np.random.default_rng(0)
@@ -109,12 +121,21 @@ def test_usable_files_are_normalised_and_the_others_skipped_with_a_sentence(impo
         assert sky.max() > 100 * np.median(sky)
 
 
+def names(rng: np.random.Generator, count: int) -> dict[str, str]:
+    return {f"{int(rng.integers(2**32)):08x}" + "0" * 56: f"{k}.obj" for k in range(count)}
+
+
+def by_split(files: tuple[Asset, ...]) -> list[set[str]]:
+    pool = AssetPool(meshes=files)
+    return [{asset.sha256 for asset in pool.of_split(split).meshes} for split in ("train", "val", "test")]
+
+
 def test_each_file_is_in_one_split_and_which_one_depends_on_its_content_only() -> None:
-    assets = tuple(Asset(f"{k}.obj", f"{int(RNG.integers(2**32)):08x}" + "0" * 56) for k in range(2000))
-    pools = [AssetPool(meshes=assets).of_split(split).meshes for split in ("train", "val", "test")]
-    assert sum(map(len, pools)) == 2000
-    assert [round(len(pool) / 2000, 1) for pool in pools] == [0.8, 0.1, 0.1]
-    assert not set(pools[0]) & set(pools[1]) | set(pools[0]) & set(pools[2]) | set(pools[1]) & set(pools[2])
+    files = names(RNG, 2000)
+    pools = by_split(spread_over_splits(files))
+    assert set.union(*pools) == files.keys()
+    assert [round(len(pool) / len(files), 1) for pool in pools] == [0.8, 0.1, 0.1]
+    assert not pools[0] & pools[1] | pools[0] & pools[2] | pools[1] & pools[2]
 
 
 @pytest.mark.parametrize("count", [3, 4, 6, 9, 12, 30])
@@ -122,18 +143,32 @@ def test_few_files_are_spread_over_all_splits(count: int) -> None:
     """Among three files the hash alone leaves a split empty nine times of ten."""
     rng = np.random.default_rng(count)
     for _ in range(20):
-        assets = tuple(Asset(f"{k}.obj", f"{int(rng.integers(2**32)):08x}" + "0" * 56) for k in range(count))
-        pools = [AssetPool(meshes=assets).of_split(split).meshes for split in ("train", "val", "test")]
+        files = names(rng, count)
+        pools = by_split(spread_over_splits(files))
         assert all(pools)
-        assert len(pools[0]) >= count / 3
-        assert sorted(a.sha256 for pool in pools for a in pool) == sorted(a.sha256 for a in assets)
-        again = [AssetPool(meshes=assets[::-1]).of_split(split).meshes for split in ("train", "val", "test")]
-        assert [set(pool) for pool in again] == [set(pool) for pool in pools]
+        assert len(pools[0]) >= count // 3
+        assert set.union(*pools) == files.keys()
+        assert spread_over_splits(dict(reversed(files.items()))) == spread_over_splits(files)
+
+
+@pytest.mark.parametrize("before", [1, 2, 3, 5, 20])
+def test_a_file_keeps_its_split_when_the_pool_grows(before: int) -> None:
+    """What was trained on must not be tested on. By their number alone one of three files changed its split."""
+    rng = np.random.default_rng(before)
+    for _ in range(30):
+        every = names(rng, before + int(rng.integers(1, 10)))
+        first = spread_over_splits(dict(list(every.items())[:before]))
+        grown = spread_over_splits(every, first)
+        assert {*first} <= {*grown}
+        assert len(grown) == len(every)
+        if before > 1:
+            assert all(by_split(grown)) or len(every) < 3
 
 
 def test_a_split_without_files_is_refused_and_the_others_are_counted() -> None:
-    assets = tuple(Asset(f"{k}.obj", f"{k:064x}") for k in range(5))
-    one, two = AssetPool(meshes=assets[:1]), AssetPool(meshes=assets[:2], textures=assets)
+    files = spread_over_splits({f"{k:064x}": f"{k}.obj" for k in range(5)})
+    one = AssetPool(meshes=spread_over_splits({"0" * 64: "0.obj"}))
+    two = AssetPool(meshes=spread_over_splits({f"{k:064x}": f"{k}.obj" for k in range(2)}), textures=files)
     require_assets(one, ["train"])
     with pytest.raises(DatasetError, match="split test has none of the 1 files of --meshes"):
         require_assets(one, ["train", "test"])
@@ -155,7 +190,8 @@ def test_the_share_of_the_user_s_files(imported: ImportedAssets) -> None:
         scene = recipe.sample("train", 0)
         counts.append(sum(isinstance(thing.shape, UserMesh) for thing in scene.objects))
         assert ("\n  share: " in recipe_to_text(recipe)) == (share is not None)
-        assert recipe_from_text(recipe_to_text(recipe).encode(), "recipe") == recipe
+        text, files = recipe_to_text(recipe).encode(), pool_to_text(pool).encode()
+        assert recipe_from_text(text, "recipe", lambda files=files: files) == recipe
     assert counts[0] < counts[1] < counts[2]
     with pytest.raises(ValueError, match="above 0 and at most 1"):
         AssetPool(share=1.5)
@@ -253,8 +289,8 @@ def test_a_file_that_brings_its_reader_down_is_skipped(tmp_path: Path) -> None:
         (tmp_path / f"{name}.stl").write_bytes(bytes([number]))
     skipped: list[str] = []
     limits = Limits(timeout_s=2.0, memory_bytes=900 << 20)
-    (asset,) = _FolderImport((".stl",), crash_or_grow, limits, tmp_path).run(tmp_path, skipped, [])
-    assert asset.name == "fine.stl"
+    found = _FolderImport((".stl",), crash_or_grow, limits, tmp_path).run(tmp_path, skipped, [])
+    assert [*found.values()] == ["fine.stl"]
     crash, greedy, slow = (sentence.removeprefix(f"{tmp_path}/") for sentence in skipped)
     assert crash == "crash.stl: cannot be read, its process crashed (SIGSEGV)"
     assert greedy.startswith("greedy.stl: ")
@@ -274,7 +310,7 @@ def test_what_a_store_has_is_not_prepared_again(tmp_path: Path) -> None:
     damaged.write_bytes(damaged.read_bytes()[:100])
     trimesh.creation.box().export(folder / "3.stl")
     told: list[tuple[str, int, int]] = []
-    grown = import_assets(store, meshes=folder, progress=lambda *state: told.append(state))
+    grown = import_assets(store, meshes=folder, known=first.pool, progress=lambda *state: told.append(state))
     assert told == [("meshes", 3, 4), ("meshes", 4, 4)], "the new file and the damaged one"
     assert {*first.pool.meshes} < {*grown.pool.meshes}
     after = {path.name: path.stat().st_mtime_ns for path in store.iterdir()}
@@ -294,6 +330,21 @@ def test_pictures_of_large_cameras_and_panoramas_are_made_smaller(tmp_path: Path
     assert cv2.imwrite(str(tmp_path / "sky.hdr"), panorama)
     radiance = prepare_environment(tmp_path / "sky.hdr")["radiance"]
     assert radiance.shape == (MAX_SIDE_PX // 2, MAX_SIDE_PX, 3)
+
+
+def test_pictures_that_are_made_smaller_may_be_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PNG files of more than 67 million pixels were refused, and above Pillow's limit all others."""
+    rows = np.linspace(0, 255, 9000).astype(np.uint8)
+    assert cv2.imwrite(str(tmp_path / "survey.png"), np.repeat(rows[:, None], 9000, axis=1))
+    image = prepare_texture(tmp_path / "survey.png")["image"]
+    assert image.shape == (MAX_SIDE_PX, MAX_SIDE_PX, 3)
+    assert np.abs(image[:: MAX_SIDE_PX // 4, 0, 0] - (0, 64, 128, 191)).max() <= 1
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
+    Image.new("RGB", (90, 60), (10, 20, 200)).save(tmp_path / "small.bmp")
+    assert prepare_texture(tmp_path / "small.bmp")["image"][0, 0].tolist() == [10, 20, 200]
+    assert Image.MAX_IMAGE_PIXELS == 1000
+    with pytest.raises(FormatError, match="more pixels"):
+        read_picture(tmp_path / "small.bmp")
 
 
 def test_fine_meshes_are_decimated(tmp_path: Path) -> None:
@@ -323,7 +374,7 @@ def test_prepared_files_are_copied_whole_and_once(tmp_path: Path) -> None:
     store.mkdir()
     np.savez(store / f"{sha256}.npz", image=np.zeros((2, 2, 3), np.uint8))
     np.savez(store / f"{'1' * 64}.npz", image=np.zeros(1))  # of another data set
-    pool = AssetPool(textures=(Asset("a.png", sha256),))
+    pool = AssetPool(textures=(Asset("a.png", sha256, "train"),))
     copy_prepared(pool, store, target)
     assert [path.name for path in target.iterdir()] == [f"{sha256}.npz"]
     time = (target / f"{sha256}.npz").stat().st_mtime_ns
@@ -338,7 +389,7 @@ def test_unknown_folders_and_files_are_refused(user: Path, tmp_path: Path) -> No
         import_assets(tmp_path / "store", textures=user / "environments")
     with pytest.raises(ValueError, match="in no store"):
         UserMesh("ab" * 32).mesh()
-    for named in (UserMesh("../../etc/passwd").mesh, lambda: Asset("x", "../../etc/passwd")):
+    for named in (UserMesh("../../etc/passwd").mesh, lambda: Asset("x", "../../etc/passwd", "train")):
         with pytest.raises(ValueError, match="named by its SHA-256"):
             named()
 
@@ -375,6 +426,27 @@ def test_a_data_set_carries_the_files_it_uses(
     moved = out.rename(tmp_path / "moved")
     assert verify_dataset(moved, workers=1).problems == ()
     assert StereoDataset(moved, "train")[0].left.std() > 5
+    # And behind a URL, and as shards.
+    store = open_tree("memory://moved")
+    for name in LocalTree(moved).files_below(""):
+        store.write(name, (moved / name).read_bytes())
+    monkeypatch.setattr("scenes.user_assets.pool._stores", [])
+    assert verify_dataset("memory://moved").problems == ()
+    shards = open_tree(tmp_path / "shards")
+    EXPORTERS["webdataset"]([StereoDataset(moved, "train")], shards, ExportOptions(), lambda *_: None)
+    assert read_recipe(tmp_path / "shards/recipe.yaml") == written
+
+
+def test_a_split_without_files_is_refused_however_the_recipe_comes(
+    imported: ImportedAssets, tmp_path: Path
+) -> None:
+    """The command checked the files of its flags only."""
+    pool = AssetPool(meshes=spread_over_splits({imported.pool.meshes[0].sha256: "mine.obj"}))
+    recipe = Recipe(FAMILIES["flying_things"].config(), {"train": 0, "test": 1}, assets=pool)
+    write_recipe(tmp_path / "recipe.yaml", recipe)
+    with pytest.raises(DatasetError, match="split test has none of the 1 files of --meshes"):
+        Render(out=str(tmp_path / "set"), recipe=tmp_path / "recipe.yaml", workers=1).run()
+    assert not (tmp_path / "set").exists()
 
 
 def test_the_sun_of_half_floats_is_no_black_hole(tmp_path: Path) -> None:

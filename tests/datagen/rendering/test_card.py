@@ -110,12 +110,19 @@ def test_the_users_files_and_their_licences(analytic_dataset: Path, own_dataset:
     recipe = own_dataset / "recipe.yaml"
     from datagen.recipe.recipe import read_recipe, write_recipe
 
-    pool = AssetPool(meshes=(Asset("chair|1.obj", "ab" * 32),), textures=(Asset("wood.png", "cd" * 32),))
+    pool = AssetPool(
+        meshes=(Asset("chair|1.obj", "ab" * 32, "train"),), textures=(Asset("wood.png", "cd" * 32, "train"),)
+    )
     write_recipe(recipe, replace(read_recipe(recipe), assets=pool))
     text = compose_card(LocalTree(own_dataset)).text
     assert f"| mesh | chair 1.obj | `{'ab' * 32}` |" in text
     assert f"| texture | wood.png | `{'cd' * 32}` |" in text
     assert f"write them into `{LICENSES}`" in text
+    many = replace(pool, meshes=tuple(Asset(f"{k}.obj", f"{k:064x}", "train") for k in range(300)))
+    write_recipe(recipe, replace(read_recipe(recipe), assets=many))
+    text = compose_card(LocalTree(own_dataset)).text
+    assert text.count("| mesh |") == 100
+    assert "And 201 more, which `assets.json` lists." in text
     (own_dataset / LICENSES).write_text("chair|1.obj: CC BY 4.0, Jane Doe\n")
     text = compose_card(LocalTree(own_dataset)).text
     assert "CC BY 4.0, Jane Doe" in text

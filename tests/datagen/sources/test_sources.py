@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from datagen import DatasetError
+from datagen import DatasetError, StereoDataset
 from datagen.dataset.shards import CACHE_VARIABLE
+from datagen.export import EXPORTERS, ExportOptions
 from datagen.formats import read_pfm, write_pfm
 from datagen.ground_truth.from_disparity import derive_occlusion
 from datagen.sources.registry import DataSource, open_source, source_formats
 from datagen.sources.webdataset import scene_of
+from stereoforge_kit.files import open_tree
 from tests.datagen.sources import published
 from tests.datagen.sources.published import World, png, shard, shard_members, world
 
@@ -560,3 +562,17 @@ def test_frames_do_not_pile_up(tmp_path: Path) -> None:
     assert frame.left is frame.left
     assert frames[0] is not frame
     assert not {"left", "disparity_left"} & vars(frames[0]).keys()
+
+
+def test_a_split_without_frames_is_told_from_a_set_without_any(
+    analytic_dataset: Path, tmp_path: Path
+) -> None:
+    """Shards without a test split were said to have no frame in the layout of shards."""
+    sets = [StereoDataset(analytic_dataset, "train")]
+    EXPORTERS["webdataset"](sets, open_tree(tmp_path / "wds"), ExportOptions(), lambda *_: None)
+    shards = tmp_path / "wds/*.tar"
+    for location in (tmp_path / "wds", shards):
+        with pytest.raises(DatasetError, match="has no test frames; there are 4 train"):
+            open_source(f"webdataset:{location}").frames("test")
+    with pytest.raises(DatasetError, match=r"there is no such file; of shards write webdataset:.*/\*\.tar"):
+        open_source(str(shards))

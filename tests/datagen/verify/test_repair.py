@@ -100,7 +100,7 @@ def with_meshes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("own")
     original = folder / "mine.obj"
     original.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
-    asset = Asset("mine.obj", f"{0:064x}")  # By its first digits a mesh of the train split.
+    asset = Asset("mine.obj", f"{0:064x}", "train")
     world = FAMILIES["flying_things"].config(width=64, height=36)
     recipe = Recipe(world, {"train": 1}, seed=1, samples=1, assets=AssetPool(meshes=(asset,)))
     render_dataset(replace(recipe, scenes={}), folder / "set")

@@ -415,7 +415,8 @@ def test_what_an_unfinished_run_left_is_not_replaced(data: Path, tmp_path: Path)
 def test_a_run_may_go_on_for_longer(data: Path, tmp_path: Path) -> None:
     """Finished after 6 steps, between two validations, it goes on to 11 in the blocks of a run of 11."""
     train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=6)
-    train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=11, resume=True)
+    summary = train_quietly("regressor", [(data, 1.0)], tmp_path, quick_regressor(), steps=11, resume=True)
+    assert summary.steps == 11, "also where the best weights are those of the 6 steps"
     assert checkpoint_step(tmp_path / "logs" / "regressor" / "last.ckpt") == 11
     assert set(scalars(tmp_path, "regressor", "validation/epe")) == {3, 5, 7, 10}  # counted from 0
 
