@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.export.lidar import lidar_mask
 from datagen.formats import write_png
-from datagen.sources.kitti import FRAME_LIST, UNITS_PER_PX
+from datagen.formats.disparity import PNG_UNITS_PER_PX
+from datagen.sources.kitti import FRAME_LIST
 from scenes.shapes.street.vehicles import VEHICLE_PARTS
 from scenes.spec import Scene, StereoCamera
 from scenes.streets.traffic import vehicle_of
@@ -130,7 +131,7 @@ def _has_future(sample: StereoSample, kind: str) -> bool:
 
 def share_too_large(disparity: NDArray[np.float32]) -> float:
     """The share (0..1) of the pixels of a disparity (H, W) in px that are finite and too large to store."""
-    scaled = np.rint(disparity.astype(np.float64) * UNITS_PER_PX)
+    scaled = np.rint(disparity.astype(np.float64) * PNG_UNITS_PER_PX)
     return float((np.isfinite(scaled) & (scaled > np.iinfo(np.uint16).max)).mean())
 
 
@@ -140,7 +141,7 @@ def encode_disparity(disparity: NDArray[np.float32], keep: NDArray[np.bool_]) ->
     They are 0 where the mask `keep` (H, W) is False and where the disparity is not finite, not above 0 (infinitely far)
     or too large to store.
     """
-    scaled = np.rint(np.nan_to_num(disparity).astype(np.float64) * UNITS_PER_PX)
+    scaled = np.rint(np.nan_to_num(disparity).astype(np.float64) * PNG_UNITS_PER_PX)
     storable = keep & (disparity > 0) & (scaled <= np.iinfo(np.uint16).max)
     # A valid disparity must not become invalid by rounding; KITTI's own writer raises it to 1 too.
     return np.where(storable, np.maximum(scaled, 1), 0).astype(np.uint16)

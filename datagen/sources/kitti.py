@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.errors import FormatError
 from datagen.formats import read_png
+from datagen.formats.disparity import read_disparity_png
 from datagen.formats.impossible_disparity import drop_impossible
 from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.formats.picture import read_picture
@@ -25,8 +25,6 @@ from datagen.sources.registry import DataSource, SourceFormat
 from datagen.sources.stereo_frame import FileFrame, FileFrames, StereoFrame
 from stereoforge_kit.files import matching
 
-UNITS_PER_PX = 256
-"""Of the 16-bit PNG files; 0 stands for no disparity."""
 FRAME_LIST = "frames.txt"
 """In sets that were exported to this layout: a line for each frame with its names here and in the set it comes from
 (`datagen.export.kitti`)."""
@@ -55,28 +53,13 @@ _REFERENCE_FRAMES = "*_10.png"
 """Of the frames 00 to 20 of a sequence, number 10 has ground truth and is the one that the server judges."""
 
 
-def read_disparity(path: Path) -> NDArray[np.float32]:
-    """Read a KITTI disparity: (H, W) float32 px, NaN where there is none.
-
-    Raises FormatError for a file that is none.
-    """
-    values = read_png(path)
-    if values.dtype != np.uint16 or values.ndim != 2:
-        raise FormatError(
-            f"{path}: a KITTI disparity is a 16-bit grey PNG, not {values.dtype} {values.shape}"
-        )
-    disparity = values.astype(np.float32) / UNITS_PER_PX
-    disparity[values == 0] = np.nan
-    return disparity
-
-
 def read_labels(all_points: Path, visible_points: Path) -> NDArray[np.uint8]:
     """(H, W) occlusion labels: points that only the first file has are not visible in the right view.
 
     Raises FormatError.
     """
-    disparity, _ = drop_impossible(read_disparity(all_points))
-    not_visible = np.isnan(read_disparity(visible_points)) & ~np.isnan(disparity)
+    disparity, _ = drop_impossible(read_disparity_png(all_points))
+    not_visible = np.isnan(read_disparity_png(visible_points)) & ~np.isnan(disparity)
     return occlusion_from_mask(disparity, not_visible)
 
 
@@ -122,7 +105,7 @@ def _frames(folder: Path, edition: _Edition) -> Iterator[FileFrame]:
             scene_name=scenes.get(truth.stem, truth.stem),
             read_left=partial(read_picture, folder / edition.left / truth.name),
             read_right=partial(read_picture, folder / edition.right / truth.name),
-            read_disparity_left=partial(read_disparity, truth),
+            read_disparity_left=partial(read_disparity_png, truth),
             read_occlusion_left=partial(read_labels, truth, visible) if visible.is_file() else None,
             read_foreground_left=partial(read_foreground, objects) if objects and objects.is_file() else None,
         )

@@ -67,8 +67,9 @@ class Refine:
     """Run folder with a regressor, a confnet and a gradnet, or with confnet_free and gradnet_free, which judge any
     predictor's disparity. paper: the bundled networks of the paper."""
     disparity: Annotated[Path | None, shown("FILE", "none")] = None
-    """Disparity of the left view in pixels to refine instead of predicting one: PFM (NaN, infinite, negative or
-    wider than the picture where there is none) or 16-bit PNG as KITTI has it (value / 256, 0 where there is none)."""
+    """Disparity of the left view in pixels to refine instead of predicting one: PFM or .npy, .npz
+    (NaN, infinite, negative or wider than the picture where there is none; int16 as OpenCV's matchers return it) or
+    16-bit PNG as KITTI has it (value / 256, 0 where there is none)."""
     disparity_right: Annotated[Path | None, shown("FILE", "matched by SGBM")] = None
     """Disparity of the right view, which tells how far to trust the left one's."""
     predictor: Literal["networks", "sgbm"] = "networks"

@@ -64,7 +64,8 @@ class Train:
     """Share of the run over which the crops come from a growing first part of every data set, for those rendered from
     simple to complex (render --curriculum)."""
     pseudo_labels: Annotated[Path | None, shown("DIR", "none")] = None
-    """Folder of disparities to train on instead of the data set's ground truth: <frame name>.pfm or KITTI-like .png."""
+    """Folder of disparities to train on instead of the data set's ground truth: <frame name> with .pfm, .npy,
+    .npz or KITTI-like .png."""
     init: Annotated[Path | None, shown("RUN", "none")] = None
     """Run folder of the regressor to start from or to build on; for joint, of all three networks and, where they are
     validated, of the refinement's parameters, which are copied too."""

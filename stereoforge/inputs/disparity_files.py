@@ -7,21 +7,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.formats import read_pfm_disparity
+from datagen.formats.disparity import DISPARITY_KINDS, DISPARITY_READERS
 from datagen.formats.impossible_disparity import PREDICTION_NOISE_PX, drop_impossible
-from datagen.sources.kitti import read_disparity as read_kitti
 from stereoforge.errors import CommandError
-
-READERS = {".pfm": read_pfm_disparity, ".png": read_kitti}
-"""By the file's ending."""
-
 
 MOSTLY = 0.5
 """From this share of impossible values on, the disparity is probably meant otherwise."""
 
 
 def read_disparity(path: Path, size: tuple[int, int]) -> tuple[NDArray[np.float32], list[str]]:
-    """(H, W) pixels of a PFM, or of a 16-bit PNG as KITTI has it (value / 256, 0 for none), and remarks about it.
+    """(H, W) pixels of a file in one of `datagen.formats.disparity`'s formats, and remarks about it.
 
     Where there is none the array is NaN: what is not finite, larger than the picture is wide, or negative by more than
     noise. A 0 in a PFM is infinitely far.
@@ -33,11 +28,11 @@ def read_disparity(path: Path, size: tuple[int, int]) -> tuple[NDArray[np.float3
         CommandError: A file of another kind or size, or without any disparity.
         DatasetError: A damaged file.
     """
-    if path.suffix.lower() not in READERS:
-        raise CommandError(f"{path}: a disparity is a .pfm or a 16-bit .png file")
+    if path.suffix.lower() not in DISPARITY_READERS:
+        raise CommandError(f"{path}: a disparity is {DISPARITY_KINDS}")
     if not path.is_file():
         raise CommandError(f"{path}: there is no such file")
-    disparity = READERS[path.suffix.lower()](path)
+    disparity = DISPARITY_READERS[path.suffix.lower()](path)
     if disparity.shape != size:
         got = "x".join(map(str, disparity.shape[1::-1]))
         raise CommandError(f"{path}: is {got}, the pictures are {size[1]}x{size[0]}")

@@ -12,14 +12,11 @@ from functools import partial
 from pathlib import Path
 from typing import overload
 
-from datagen.formats import read_pfm_disparity
+from datagen.formats.disparity import DISPARITY_READERS
 from datagen.formats.impossible_disparity import PREDICTION_NOISE_PX
-from datagen.sources.kitti import read_disparity as read_kitti_disparity
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
 from training.data.pipeline import Source
 from training.errors import TrainingError
-
-_READERS = {".pfm": read_pfm_disparity, ".png": read_kitti_disparity}
 
 
 def with_pseudo_labels(sources: Sequence[Source], folder: Path) -> Source:
@@ -36,9 +33,9 @@ def with_pseudo_labels(sources: Sequence[Source], folder: Path) -> Source:
 class PseudoLabelFrames(Sequence[StereoFrame]):
     """The frames of a data set, with the disparities of a folder as ground truth of their left views.
 
-    A frame `a/b` takes `a/b.pfm` of the folder (in pixels; infinity or NaN where unknown) or `a/b.png` (as KITTI has
-    it: 16 bits, 256 times the disparity, 0 where unknown). Disparities that cannot be become NaN. The right view then
-    has no ground truth, and occlusion is unknown.
+    A frame `a/b` takes `a/b.pfm` of the folder (in pixels; infinity or NaN where unknown), `a/b.png` (as KITTI has it:
+    16 bits, 256 times the disparity, 0 where unknown), `a/b.npy` or `a/b.npz`. Disparities that cannot be become NaN.
+    The right view then has no ground truth, and occlusion is unknown.
     """
 
     def __init__(self, frames: Sequence[StereoFrame], folder: Path) -> None:
@@ -68,16 +65,18 @@ class PseudoLabelFrames(Sequence[StereoFrame]):
             scene_name=frame.scene_name,
             read_left=partial(getattr, frame, "left"),
             read_right=partial(getattr, frame, "right"),
-            read_disparity_left=partial(_READERS[self._files[index].suffix.lower()], self._files[index]),
+            read_disparity_left=partial(
+                DISPARITY_READERS[self._files[index].suffix.lower()], self._files[index]
+            ),
             disparity_noise_px=PREDICTION_NOISE_PX,
         )
 
 
 def _file_of(folder: Path, name: str) -> Path:
-    for suffix in (*_READERS, *map(str.upper, _READERS)):
+    for suffix in (*DISPARITY_READERS, *map(str.upper, DISPARITY_READERS)):
         path = folder / f"{name}{suffix}"
         if path.is_file():
             return path
     raise TrainingError(
-        f"{folder}: has no disparity for the frame {name} (neither {name}.pfm nor {name}.png)"
+        f"{folder}: has no disparity for the frame {name} ({name} with {', '.join(DISPARITY_READERS)})"
     )

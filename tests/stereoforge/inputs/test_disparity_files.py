@@ -67,7 +67,7 @@ def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "map.tif").write_bytes(b"")
     for name, reason in (
         ("nothing.pfm", "holds no disparity"),
-        ("map.tif", r"\.pfm or a 16-bit \.png"),
+        ("map.tif", r"\.pfm, a 16-bit \.png, a \.npy or a \.npz"),
         ("gone.pfm", "no such file"),
     ):
         with pytest.raises(CommandError, match=f"{name}: .*{reason}"):
