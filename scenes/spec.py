@@ -88,6 +88,10 @@ class Deformation(ABC):
         """
 
 
+GLOSSY = 0.35
+"""Largest roughness of a material whose highlights show what is around it."""
+
+
 @dataclass(frozen=True)
 class Material:
     """How a surface reflects light: a base-colour texture and the scalars of a principled BSDF."""
@@ -105,6 +109,13 @@ class Material:
     """Share of the light refracted through the surface. Ground truth is of the surface itself nonetheless."""
     emission: float = 0.0
     """Emitted radiance, multiplied by the base colour."""
+    thin: bool = field(default=False, metadata={"omit_default": True})
+    """A sheet that light passes straight through, its share being `transmission`: window panes."""
+
+    @property
+    def is_reflective(self) -> bool:
+        """Whether it shows what is around or behind it: a metal, glass, or a gloss."""
+        return self.metallic > 0 or self.transmission > 0 or (self.specular > 0 and self.roughness <= GLOSSY)
 
 
 @lru_cache(maxsize=512)
@@ -357,6 +368,8 @@ class World:
 
     environment: Texture
     strength: float = 1.0
+    sampled: bool = field(default=True, metadata={"omit_default": True})
+    """Whether surfaces look for its light; in a room, which sees little of it, that is mostly in vain."""
 
 
 @dataclass(frozen=True)

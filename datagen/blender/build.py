@@ -150,7 +150,7 @@ def _build_environment(world: World, blender_scene: bpy.types.Scene) -> None:
     block = bpy.data.worlds.new("environment")
     block.use_nodes = True
     # Left to itself Cycles tabulates 4096 x 2048 directions, which takes three seconds a scene.
-    block.cycles.sampling_method = "MANUAL"
+    block.cycles.sampling_method = "MANUAL" if world.sampled else "NONE"
     block.cycles.sample_map_resolution = 256
     nodes, links = block.node_tree.nodes, block.node_tree.links
     nodes.clear()

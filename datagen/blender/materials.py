@@ -48,12 +48,33 @@ def build_material(name: str, material: Material) -> bpy.types.Material:
     if material.emission > 0 and surface.type == "BSDF_PRINCIPLED":
         links.new(texture.outputs["Color"], surface.inputs["Emission Color"])
     output = nodes.new("ShaderNodeOutputMaterial")
-    links.new(surface.outputs[0], output.inputs["Surface"])
+    shader = _sheet(block.node_tree, material, surface.outputs[0]) if material.thin else surface.outputs[0]
+    links.new(shader, output.inputs["Surface"])
     return block
+
+
+def _sheet(
+    tree: bpy.types.NodeTree, material: Material, surface: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """The shader of a thin sheet: light passes straight on, but for what is reflected or not transmitted.
+
+    Light from lamps passes too, which a refracting pane would stop where there are no caustics.
+    """
+    clear, glossy = tree.nodes.new("ShaderNodeBsdfTransparent"), tree.nodes.new("ShaderNodeBsdfGlossy")
+    glossy.inputs["Roughness"].default_value = material.roughness
+    opaque, mirrored = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeMixShader")
+    opaque.inputs[0].default_value = material.transmission
+    tree.links.new(surface, opaque.inputs[1])
+    tree.links.new(clear.outputs[0], opaque.inputs[2])
+    tree.links.new(tree.nodes.new("ShaderNodeFresnel").outputs[0], mirrored.inputs[0])
+    tree.links.new(opaque.outputs[0], mirrored.inputs[1])
+    tree.links.new(glossy.outputs[0], mirrored.inputs[2])
+    return mirrored.outputs[0]
 
 
 def _surface_node(nodes: bpy.types.Nodes, material: Material) -> bpy.types.ShaderNode:
     shiny = material.specular > 0 or material.metallic > 0 or material.transmission > 0
+    shiny = shiny and not material.thin
     if not shiny and material.emission == 0:
         return nodes.new("ShaderNodeBsdfDiffuse")
     surface = nodes.new("ShaderNodeBsdfPrincipled")

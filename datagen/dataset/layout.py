@@ -75,6 +75,7 @@ KINDS = {
         Kind("object_index", ".png"),
         Kind("material_index", ".png"),
         Kind("depth", ".exr"),
+        Kind("reflective", ".png"),
         Kind("normals", ".exr"),
         Kind("optical_flow", ".pfm", over_time=True),
         Kind("disparity_change", ".pfm", over_time=True),
@@ -91,6 +92,7 @@ TARGETS = ("disparity", "disparity_gradient", "occlusion", "object_index", "came
 EXTRA_TARGETS = (
     "depth",
     "material_index",
+    "reflective",
     "normals",
     "optical_flow",
     "disparity_change",

@@ -178,6 +178,10 @@ class StereoSample:
         """(H, W) metres along the optical axis, infinite for the sky."""
         return self._extra("depth", view, read_depth, (), np.float32)
 
+    def reflective(self, view: View) -> NDArray[np.uint8]:
+        """(H, W) 255 where the surface is glossy, metallic or transparent, else 0."""
+        return self._extra("reflective", view, read_png, (), np.uint8)
+
     def normals(self, view: View) -> NDArray[np.float32]:
         """(H, W, 3) unit normals in the camera's frame (x right, y up, z towards the camera), 0 for the sky."""
         return self._extra("normals", view, read_normals, (3,), np.float32)

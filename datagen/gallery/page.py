@@ -180,6 +180,9 @@ def _extra_pictures(sample: StereoSample, recipe: Recipe) -> list[tuple[str, Pic
         pictures.append(("Surface normals", normals_picture(sample.normals("left")), 90))
     if "material_index" in recipe.targets:
         pictures.append(("Materials", index_picture(_thinned(sample.material_index("left"))), None))
+    if "reflective" in recipe.targets:
+        marked = (sample.reflective("left") > 0).astype(np.uint8)
+        pictures.append(("Glossy, metallic or transparent", occlusion_picture(marked, sample.left), 85))
     if "optical_flow" in recipe.targets:
         full_px = FULL_COLOR_FLOW * sample.size[1]
         flow = gradient_picture(sample.flow("left", "into_future"), full_px)

@@ -134,6 +134,12 @@ def material_index(scene: Scene, object_index: NDArray[np.integer[Any]]) -> NDAr
     return np.array(worn, np.uint16)[object_index]
 
 
+def reflective(scene: Scene, object_index: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:
+    """(H, W) 255 where the object that (H, W) object_index names is glossy, metallic or transparent, else 0."""
+    shows = [False, *(scene.materials[thing.material].is_reflective for thing in scene.objects)]
+    return (np.array(shows) * np.uint8(255))[object_index]
+
+
 def object_edges(object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
     """(H, W) True where a pixel shows another object than one of its four neighbours."""
     marked = np.zeros(object_index.shape, bool)
@@ -187,7 +193,9 @@ class ExtraTargets:
             made["material_index", None] = material_index(self._caster.geometry.scene, object_index)
         if "depth" in self._kinds:
             made["depth", None] = self._caster.geometry.scene.camera.depth(disparity).astype(np.float32)
-        if set(self._kinds) <= {"depth", "material_index"}:
+        if "reflective" in self._kinds:
+            made["reflective", None] = reflective(self._caster.geometry.scene, object_index)
+        if set(self._kinds) <= {"depth", "material_index", "reflective"}:
             return made
         pixels = np.indices(object_index.shape)
         surfaces = find_surfaces(self._caster, view, frame, pixels[0], pixels[1])

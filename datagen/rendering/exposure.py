@@ -1,4 +1,9 @@
-"""From scene-linear radiance to 8-bit sRGB pictures, as a camera with automatic exposure makes them."""
+"""From scene-linear radiance to 8-bit sRGB pictures, as a camera with automatic exposure makes them.
+
+All families share one metering and one tone curve. The curve is linear up to a knee above middle grey, so that
+surfaces keep their colours, and then bends towards white without reaching it for a while, as film does: lamps and
+skies fade instead of being cut off. The lens's glare lifts the blacks a little.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +13,10 @@ from numpy.typing import NDArray
 HIGHLIGHT_PERCENTILE = 98.0
 HIGHLIGHT_CEILING = 1.1
 """The exposure may raise that percentile of luminance to this at most, so that bright scenes keep their highlights."""
+KNEE = 0.4
+"""Light up to this level, 1 being white, is developed as it is; brighter light is rolled off."""
+GLARE = 0.0015
+"""Light that the lens spreads over the whole picture, 1 being white."""
 _REC709 = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
@@ -28,6 +37,14 @@ def automatic_exposure(radiance: NDArray[np.float32], key: float) -> float:
 
 def develop(radiance: NDArray[np.float32], exposure: float) -> NDArray[np.uint8]:
     """(H, W, 3) uint8 sRGB of linear radiance (H, W, 3) times the exposure (IEC 61966-2-1 transfer function)."""
-    linear = np.clip(radiance * np.float32(exposure), 0.0, 1.0)
+    linear = _rolled_off(np.maximum(radiance * np.float32(exposure), 0.0) + np.float32(GLARE))
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return np.rint(encoded * 255.0).astype(np.uint8)
+
+
+def _rolled_off(light: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Light (...) of any level, 1 being white, in 0..1: linear up to `KNEE`, from there on 1 - exp(-x) towards 1."""
+    room = np.float32(1 - KNEE)
+    above = np.maximum(light - np.float32(KNEE), 0.0) / room
+    rolled: NDArray[np.float32] = np.minimum(light, np.float32(KNEE)) - room * np.expm1(-above)
+    return rolled

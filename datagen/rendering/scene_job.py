@@ -126,6 +126,7 @@ def _render_attempt(
 _EXTRA_WRITERS: dict[str, Callable[[Path, Any], None]] = {
     "depth": write_depth,
     "material_index": write_png,
+    "reflective": write_png,
     "normals": write_normals,
     "optical_flow": write_flow,
     "disparity_change": write_pfm,

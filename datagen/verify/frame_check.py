@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from datagen.ground_truth.targets import (
     material_index,
     motion_boundaries,
     object_edges,
+    reflective,
 )
 from datagen.recipe.recipe import Recipe
 from datagen.verify.checks import (
@@ -120,14 +122,14 @@ class FrameCheck:
         sample, kinds = self.samples[0], self.recipe.targets
         rows, columns = self._sampled(view)
         surfaces = None
-        if self.caster is not None and not set(kinds) <= {"depth", "material_index", "motion_boundaries"}:
+        followed = {"depth", "material_index", "reflective", "motion_boundaries"}
+        if self.caster is not None and not set(kinds) <= followed:
             surfaces = find_surfaces(self.caster, view, sample.frame - FIRST_FRAME, rows, columns)
-        if "material_index" in kinds:
-            stored, index = sample.material_index(view), sample.view(view).object_index
-            if index.max() <= len(self.scene.objects):  # Otherwise that is the problem and has been reported.
-                worn = material_index(self.scene, index)
-                for message in check_derived(stored, worn, "the objects' materials"):
-                    yield self._file("material_index", view), message
+        index = sample.view(view).object_index
+        if index.max() <= len(self.scene.objects):  # Otherwise that is the problem and has been reported.
+            for kind, stored, expected in self._of_materials(view, index):
+                for message in check_derived(stored, expected, "the objects' materials"):
+                    yield self._file(kind, view), message
         if "depth" in kinds:
             for message in check_depth(sample.depth(view), sample.view(view).disparity, self.scene.camera):
                 yield self._file("depth", view), message
@@ -140,6 +142,16 @@ class FrameCheck:
             yield from self._check_motion(view, direction, surfaces)
         if "motion_boundaries" in kinds:
             yield from self._check_boundaries(view)
+
+    def _of_materials(
+        self, view: View, index: NDArray[np.uint16]
+    ) -> Iterator[tuple[str, NDArray[Any], NDArray[Any]]]:
+        """Kind, stored and expected values of the targets that follow from the objects' materials."""
+        sample, kinds = self.samples[0], self.recipe.targets
+        if "material_index" in kinds:
+            yield "material_index", sample.material_index(view), material_index(self.scene, index)
+        if "reflective" in kinds:
+            yield "reflective", sample.reflective(view), reflective(self.scene, index)
 
     def _check_motion(
         self, view: View, direction: Direction, surfaces: PixelSurfaces | None

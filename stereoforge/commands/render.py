@@ -68,7 +68,7 @@ class Render:
     """Render passes, comma-separated: clean, and final with motion blur, defocus, fog and sensor noise."""
     targets: Annotated[str | None, shown("all|LIST", "none")] = None
     """Targets besides disparity, gradient, occlusion and object index, comma-separated: depth,
-    material_index, normals, optical_flow, disparity_change, motion_boundaries."""
+    material_index, reflective, normals, optical_flow, disparity_change, motion_boundaries."""
     device: Literal["auto", "cpu", "cuda", "optix", "hip", "metal"] = "auto"
     """What Cycles computes on; auto takes the GPU that Blender finds on this machine, else the cpu."""
     workers: Annotated[int | None, shown("N", "one a core")] = None

@@ -1,0 +1,124 @@
+"""Where the stereo rig is in a room: held by a person, on a tripod, or on a robot."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from scenes.motion.trajectories import vector, wander
+from scenes.placement.view import View
+from scenes.random_draws import chance, choose, log_uniform, uniform
+from scenes.rooms.config import IndoorConfig
+from scenes.rooms.interior import Extent, Interior
+from scenes.rooms.plan import Plan
+from scenes.spec import StereoCamera, Trajectory
+
+_CANDIDATES = 60
+_MARGIN_M = 0.2
+"""Between the rig and walls or furniture."""
+
+
+def sample_camera(rng: np.random.Generator, config: IndoorConfig, interior: Interior) -> StereoCamera:
+    """Draw a camera that stands free and sees much of the room.
+
+    The baseline is so small that walls, floor and ceiling keep within the largest disparity allowed.
+    """
+    plan = interior.plan
+    focal_mm = log_uniform(rng, *config.focal_mm)
+    baseline_m = log_uniform(rng, *config.baseline_m)
+    carrier = choose(
+        rng, ["person", "tripod", "robot"], [config.person_share, *((1 - config.person_share) / 2,) * 2]
+    )
+    centres = np.array([(thing.extent.low + thing.extent.high) / 2 for thing in interior.placed])
+    best: list[tuple[float, NDArray[np.float64], Rotation]] = []
+    for _ in range(_CANDIDATES):
+        place, turn = _candidate(rng, plan, carrier)
+        if _stands_free(place, baseline_m, turn, interior):
+            best.append((_interest(place, turn, focal_mm, centres, plan), place, turn))
+    if not best:
+        place, turn = _candidate(rng, plan, carrier)
+        best.append((0.0, place, turn))
+    best.sort(key=lambda item: -item[0])
+    _, place, turn = best[int(rng.integers(min(5, len(best))))]
+    still = StereoCamera(config.width, config.height, focal_mm, baseline_m, Trajectory.static(vector(place)))
+    depth_m = nearest_shell_m(plan, still, place, turn)
+    baseline_m = min(
+        baseline_m, 0.95 * config.largest_disparity_share * config.width * depth_m / still.focal_px
+    )
+    motion = wander(
+        rng,
+        config.frames,
+        place,
+        turn,
+        speed_m=uniform(rng, *config.camera_speed_m),
+        turn_deg=uniform(rng, *config.camera_turn_deg),
+        reach_m=0.5 * _MARGIN_M,
+        reach_deg=3.0,
+    )
+    return replace(still, baseline_m=baseline_m, motion=motion)
+
+
+def _candidate(rng: np.random.Generator, plan: Plan, carrier: str) -> tuple[NDArray[np.float64], Rotation]:
+    if carrier == "person":
+        height, pitch, roll = uniform(rng, 1.3, 1.8), uniform(rng, -4.0, 28.0), rng.normal(0.0, 1.5)
+    elif carrier == "tripod":
+        height, pitch, roll = uniform(rng, 0.7, 1.6), uniform(rng, -3.0, 15.0), rng.normal(0.0, 0.3)
+    else:
+        height, pitch, roll = uniform(rng, 0.2, 0.8), uniform(rng, -8.0, 8.0), rng.normal(0.0, 0.4)
+    if plan.kind == "stairs":
+        pitch -= 8.0
+    # Most cameras stand near a wall and look across the room.
+    edge = rng.uniform(0.3, 0.95, 2) ** 0.5 * np.where(rng.random(2) < 0.5, -1.0, 1.0)
+    room = np.array((plan.width, plan.depth))
+    place = np.array((*(room / 2 + edge * (room / 2 - _MARGIN_M)), height))
+    aim = room * rng.uniform(0.25, 0.75, 2) - place[:2]
+    yaw = math.degrees(math.atan2(aim[1], aim[0])) + rng.normal(0.0, 15.0)
+    if chance(rng, 0.15):
+        yaw = uniform(rng, 0.0, 360.0)
+    attitude = Rotation.from_euler("ZXZ", (yaw - 90.0, 90.0 - pitch, roll), degrees=True)
+    return place, attitude
+
+
+def _stands_free(place: NDArray[np.float64], baseline_m: float, turn: Rotation, interior: Interior) -> bool:
+    right = place + turn.apply((baseline_m, 0.0, 0.0))
+    low, high = np.minimum(place, right) - _MARGIN_M, np.maximum(place, right) + _MARGIN_M
+    plan = interior.plan
+    if (low[:2] < 0.05).any() or high[0] > plan.width - 0.05 or high[1] > plan.depth - 0.05:
+        return False
+    return interior.meets_none(Extent(low, high))
+
+
+def _interest(
+    place: NDArray[np.float64], turn: Rotation, focal_mm: float, centres: NDArray[np.float64], plan: Plan
+) -> float:
+    """How much a view shows: things in it at middle distances; less where the nearest wall fills it."""
+    if not len(centres):
+        return 0.0
+    local = turn.inv().apply(centres - place)
+    depth = -local[:, 2]
+    half = 16.0 / focal_mm
+    seen = (depth > 0.5) & (np.abs(local[:, 0]) < half * depth) & (np.abs(local[:, 1]) < 0.6 * half * depth)
+    ahead = -turn.as_matrix()[:, 2]
+    wall = _to_shell(plan, place, ahead[None])[0]
+    return float(np.sqrt(np.minimum(1.0, 2.0 / depth[seen])).sum()) * min(1.0, wall / 2.5)
+
+
+def _to_shell(plan: Plan, place: NDArray[np.float64], rays: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N,) how often each ray (N, 3) from inside fits between a place and the room's walls, floor or ceiling."""
+    room = np.array((plan.width, plan.depth, plan.height))
+    with np.errstate(divide="ignore"):
+        reach = np.where(rays > 0, (room - place) / rays, np.where(rays < 0, -place / rays, np.inf))
+    nearest: NDArray[np.float64] = reach.min(axis=1)
+    return nearest
+
+
+def nearest_shell_m(plan: Plan, camera: StereoCamera, place: NDArray[np.float64], turn: Rotation) -> float:
+    """The least depth at which a camera sees the room's walls, floor or ceiling, without what is in the room."""
+    half_x, half_y = View(camera, 1).half_view
+    across, up = np.meshgrid(np.linspace(-half_x, half_x, 13), np.linspace(-half_y, half_y, 9))
+    rays = turn.apply(np.stack([across.ravel(), up.ravel(), -np.ones(across.size)], -1))
+    return float(_to_shell(plan, place, rays).min())
