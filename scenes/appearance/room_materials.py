@@ -19,7 +19,7 @@ from scenes.spec import Material, Texture
 from scenes.textures.cells import VoronoiCells
 from scenes.textures.collages import DeadLeaves, GlyphRows
 from scenes.textures.houses import Plaster
-from scenes.textures.interiors import BookSpines, Parquet
+from scenes.textures.interiors import BookSpines, GlazedTiles, Parquet
 from scenes.textures.layers import Layered
 from scenes.textures.natural import Hair, LeafVeins
 from scenes.textures.noise import FractalNoise, Marble, WoodPlanks
@@ -94,7 +94,9 @@ def _finished(rng: np.random.Generator, shares: Shares, material: Material, weig
 
 
 def _single(rng: np.random.Generator, color: Srgb, wear: float = 0.02) -> Material:
-    """One colour, a little uneven."""
+    """One colour, or one that is a little uneven."""
+    if chance(rng, 0.6):
+        return plain(color)
     return tiled(NearTextureless(64, new_seed(rng), color, wear * uniform(rng, 0.3, 1.5), 0.004), 1.2)
 
 
@@ -128,7 +130,10 @@ def wall(rng: np.random.Generator, shares: Shares) -> Material:
             replace(WoodPlanks.sample(rng, 256), palette=_wood_palette(rng, 2), planks=6, grain=0.03),
             0.9,
         )
-    return tiled(replace(Plaster.sample(rng, 256)), uniform(rng, 2.0, 3.5))
+    grey = shade(uniform(rng, 0.55, 0.9), uniform(rng, 0.0, 0.02), uniform(rng, 40.0, 110.0))
+    return tiled(
+        Plaster(256, new_seed(rng), grey, uniform(rng, 0.02, 0.07), 0.0, 0.03), uniform(rng, 2.0, 3.5)
+    )
 
 
 def wall_tiles(rng: np.random.Generator, shares: Shares) -> Material:
@@ -138,7 +143,7 @@ def wall_tiles(rng: np.random.Generator, shares: Shares) -> Material:
     palette = tuple(shade(lightness + d * uniform(rng, 0.1, 1.0), chroma, hue) for d in (-0.04, 0.0, 0.03))
     joint = shade(choose(rng, [0.35, 0.7, 0.9]), 0.01, 90.0)
     rows, columns, bond = choose(rng, [(10, 10, 0.0), (8, 8, 0.0), (12, 6, 0.5), (12, 4, 0.0)])
-    tiles = Bricks(256, new_seed(rng), palette, joint, rows, columns, bond, uniform(rng, 0.03, 0.07), 0.015)
+    tiles = GlazedTiles(256, new_seed(rng), palette, joint, rows, columns, bond, uniform(rng, 0.03, 0.06))
     return _finished(rng, shares, tiled(tiles, rows * choose(rng, [0.1, 0.15, 0.2])), 2.5)
 
 
@@ -148,7 +153,7 @@ def ceiling(rng: np.random.Generator, shares: Shares) -> Material:
         return _single(rng, shade(uniform(rng, 0.88, 0.97), 0.008, 90.0), 0.01)
     if chance(rng, 0.6):
         white = tuple(shade(uniform(rng, 0.82, 0.93), 0.006, 90.0) for _ in range(3))
-        return tiled(Bricks(256, new_seed(rng), white, shade(0.65, 0.01, 90.0), 4, 4, 0.0, 0.025, 0.02), 2.4)
+        return tiled(GlazedTiles(256, new_seed(rng), white, shade(0.65, 0.01, 90.0), 4, 4, 0.0, 0.02), 2.4)
     return tiled(
         replace(WoodPlanks.sample(rng, 256), palette=_wood_palette(rng, 2), planks=6, grain=0.03),
         0.9,
@@ -159,7 +164,7 @@ def floor(rng: np.random.Generator, shares: Shares) -> Material:
     """Boards, parquet, tiles, carpet, linoleum, concrete, polished stone."""
     kind = choose(
         rng, ["boards", "parquet", "tiles", "checks", "carpet", "lino", "concrete", "stone"],
-        [0.2, 0.25, 0.16, 0.05, 0.12, 0.12, 0.06, 0.04],
+        [0.16, 0.22, 0.2, 0.05, 0.1, 0.17, 0.06, 0.04],
     )  # fmt: skip
     if kind == "boards":
         wood = replace(WoodPlanks.sample(rng, 400), palette=_wood_palette(rng, 2), planks=6, grain=0.03)
@@ -172,13 +177,17 @@ def floor(rng: np.random.Generator, shares: Shares) -> Material:
         palette = tuple(shade(base + d, uniform(rng, 0.0, 0.03), hue) for d in (-0.03, 0.0, 0.03))
         joint = shade(max(0.2, base - uniform(rng, 0.1, 0.4)), 0.01, 90.0)
         rows, columns, bond = choose(rng, [(4, 4, 0.0), (6, 6, 0.0), (6, 3, 0.5)])
-        tiles = Bricks(
-            320, new_seed(rng), palette, joint, rows, columns, bond, uniform(rng, 0.02, 0.04), 0.02
+        tiles = GlazedTiles(
+            320, new_seed(rng), palette, joint, rows, columns, bond, uniform(rng, 0.015, 0.04)
         )
         return _finished(rng, shares, tiled(tiles, rows * choose(rng, [0.2, 0.3, 0.45])), 1.6)
     if kind == "checks":
         checks = replace(
-            Checkers.sample(rng, 320), palette=sample_palette_in(rng, GREYS, 2), squares=8, grain=0.02
+            Checkers.sample(rng, 320),
+            palette=sample_palette_in(rng, GREYS, 2),
+            squares=8,
+            wear=0.03,
+            grain=0.01,
         )
         return _finished(rng, shares, tiled(checks, 8 * uniform(rng, 0.2, 0.4)), 1.6)
     if kind == "carpet":
@@ -352,8 +361,8 @@ def _paper(rng: np.random.Generator, shares: Shares) -> Material:  # noqa: ARG00
 
 def _cardboard(rng: np.random.Generator, shares: Shares) -> Material:
     base = shade(uniform(rng, 0.55, 0.7), 0.06, 70.0)
-    if chance(rng, shares.plain):
-        return tiled(NearTextureless(64, new_seed(rng), base, 0.04, 0.015), 0.5)
+    if chance(rng, max(shares.plain, 0.85)):
+        return _single(rng, base)
     ink = shade(uniform(rng, 0.2, 0.45), 0.05, uniform(rng, 0.0, 360.0))
     return tiled(replace(GlyphRows.sample(rng, 128), palette=(base, ink)), uniform(rng, 0.3, 0.6))
 

@@ -109,9 +109,9 @@ def _is_in_air(extent: Extent, interior: Interior, plan: Plan) -> bool:
 
 
 _REPLACEABLE = Replaceable(
-    props=r"(carton|basket|toy) .*",
+    props=r"floating .*",
     painted=r"wall .*|picture .*|rug .*|sofa .*",
-    groups=r"(thing [0-9]+) .*",
+    groups=r"((?:thing|carton|basket|toy) [0-9]+) .*",
 )
 
 FAMILY = Family("indoor", IndoorConfig, sample_indoor, _REPLACEABLE)

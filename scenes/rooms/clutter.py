@@ -119,6 +119,9 @@ def _fill_level(rng: np.random.Generator, interior: Interior, base: Placed, top:
             continue
         shape = _fitted(rng, choose(rng, list(menu), list(menu.values()))(rng), top, top.high[0] - x)
         width = float(shape.frame.high[0] - shape.frame.low[0])
+        if x + width > top.high[0]:
+            x += 0.08
+            continue
         slot = Top((x, top.low[1]), (x + width + 0.001, top.high[1]), top.z, top.headroom)
         if interior.try_on(rng, "thing", shape, base, slot, yaw=0.0, tries=2) is not None:
             x += width + uniform(rng, 0.004, 0.06)

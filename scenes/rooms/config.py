@@ -39,7 +39,7 @@ class IndoorConfig(FamilyConfig):
 
     focal_mm: Range = (16.0, 40.0)
     """Focal length on a sensor 32 mm wide, log-uniform."""
-    baseline_m: Range = (0.05, 0.35)
+    baseline_m: Range = (0.07, 0.4)
     """Distance between the cameras, log-uniform; less where `largest_disparity_share` asks for it."""
     largest_disparity_share: float = 0.2
     """No surface in view has a larger disparity than this share of the image width."""
@@ -52,7 +52,7 @@ class IndoorConfig(FamilyConfig):
     camera_turn_deg: Range = (0.0, 0.8)
     """How fast the camera turns, degrees per frame."""
 
-    plain_share: float = 0.75
+    plain_share: float = 0.85
     """How many of the walls, floors, cloths and fronts that come both ways are of one colour."""
     glossy_share: float = 0.22
     """How many of the surfaces that come both ways are varnished, lacquered, glazed or polished."""

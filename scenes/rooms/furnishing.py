@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -171,8 +172,10 @@ def _bed(rng: np.random.Generator, interior: Interior) -> None:
 
 
 def _kitchen_row(rng: np.random.Generator, interior: Interior) -> None:
-    for _ in range(3):
-        if interior.try_at_wall(rng, "kitchen", storage.KitchenRow.sample(rng), tries=20) is not None:
+    row = storage.KitchenRow.sample(rng)
+    low = storage.KitchenRow(3, 0, 2, False, row.front)
+    for shape in (row, replace(row, upper=False), low):
+        if interior.try_at_wall(rng, "kitchen", shape, tries=20) is not None:
             break
     interior.try_at_wall(rng, "fridge", storage.Fridge.sample(rng), tries=20)
 
@@ -203,7 +206,7 @@ def _bookshelves(rng: np.random.Generator, interior: Interior) -> None:
 def _ceiling_lamps(rng: np.random.Generator, interior: Interior) -> None:
     """One lamp in the middle, or a row or grid of equal ones in a large room."""
     lamp, plan = fixtures.CeilingLamp.sample(rng), interior.plan
-    large = plan.kind in ("office", "workshop", "corridor", "store room") or lamp.kind in ("tube", "panel")
+    large = plan.kind in ("office", "workshop", "corridor", "store room") or lamp.form in ("tube", "panel")
     spacing = uniform(rng, 1.8, 2.6) if large else 9.0
     columns, rows = max(1, round(plan.width / spacing)), max(1, round(plan.depth / spacing))
     yaw = choose(rng, [0.0, math.pi / 2])
@@ -236,8 +239,10 @@ def _stairs(rng: np.random.Generator, interior: Interior) -> None:
 
 
 def _pipes(rng: np.random.Generator, interior: Interior) -> None:
+    z = interior.plan.height - uniform(rng, 0.1, 0.5)
     shape = fixtures.Pipes.sample(rng)
-    interior.try_at_wall(rng, "pipes", shape, z=interior.plan.height - uniform(rng, 0.1, 0.5))
+    down = replace(shape, drop=z if shape.drop else 0.0)
+    interior.try_at_wall(rng, "pipes", down, z=z)
 
 
 def _pillar(rng: np.random.Generator, interior: Interior) -> None:
@@ -303,7 +308,7 @@ _PROGRAMMES: dict[str, tuple[tuple[Furnish, ...], dict[Furnish, float]]] = {
     ),
     "kitchen": (
         (_kitchen_row, _dining, _radiator, _ceiling_lamps),
-        {_dining: 0.6, _kitchen_row: 0.6, _stool: 1, _chair: 0.6, _sideboard: 0.8, _bookshelves: 0.5, _plant: 0.6,
+        {_dining: 0.6, _stool: 1, _chair: 0.6, _sideboard: 0.8, _bookshelves: 0.5, _plant: 0.6,
          _picture: 1.2, _plate: 1.2, _basket: 1, _carton: 0.4, _rug: 0.3},
     ),
     "office": (

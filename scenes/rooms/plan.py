@@ -17,6 +17,8 @@ from scenes.shapes.indoor.shell import Opening
 
 WALL_M = 0.25
 """Thickness of the walls."""
+_STAIR_WALLS = (2, 3)
+"""Walls without openings where there are stairs: the flight is at one, the gallery at the other."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,8 @@ def sample_plan(rng: np.random.Generator, config: IndoorConfig, kind: str) -> Pl
     for _ in range(integer(rng, *usual.doors)):
         openings += _door(rng, plan, openings)
     for wall in range(4):
+        if kind == "stairs" and wall in _STAIR_WALLS:
+            continue
         if chance(rng, usual.windows * (0.9 if wall in (0, 2) else 0.55)):
             openings += _windows(rng, plan, wall, openings)
     return Plan(kind, width, depth, plan.height, tuple(openings))
@@ -113,6 +117,8 @@ def _door(rng: np.random.Generator, plan: Plan, others: list[RoomOpening]) -> li
     wide, high = uniform(rng, 0.78, 0.98), min(uniform(rng, 1.98, 2.15), plan.height - 0.15)
     for _ in range(8):
         wall = integer(rng, 0, 3)
+        if plan.kind == "stairs" and wall in _STAIR_WALLS:
+            continue
         length = plan.wall_length(wall)
         if length < wide + 0.6:
             continue
@@ -127,6 +133,8 @@ def _windows(rng: np.random.Generator, plan: Plan, wall: int, others: list[RoomO
     """One to three equal windows in a wall."""
     length = plan.wall_length(wall)
     sill = uniform(rng, 0.15, 0.3) if chance(rng, 0.15) else uniform(rng, 0.75, 1.05)
+    if plan.kind == "kitchen":
+        sill = uniform(rng, 1.15, 1.3)
     top = min(2.9, plan.height) - uniform(rng, 0.2, 0.5)
     wide = uniform(rng, 0.8, min(2.4, max(0.9, 0.55 * length)))
     count = max(1, min(integer(rng, 1, 3), int(length / (wide + 0.5))))

@@ -78,7 +78,7 @@ def _add_window(
         shape = Blind(
             opening.width,
             height,
-            blind.kind,
+            blind.form,
             min(1.0, blind.let_down * uniform(rng, 0.8, 1.2)),
             blind.tilt_deg,
         )

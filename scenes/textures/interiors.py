@@ -11,16 +11,19 @@ from numpy.typing import NDArray
 
 from scenes.appearance.painting import (
     Palette,
+    Srgb,
     colorize,
     finish,
     fraction,
+    mix,
     oklch_to_srgb,
+    paint,
     sample_palette,
     smooth_step,
     spectral_noise,
     unit_grid,
 )
-from scenes.random_draws import choose, new_seed, uniform
+from scenes.random_draws import choose, integer, new_seed, uniform
 from scenes.spec import Texture
 
 
@@ -76,6 +79,44 @@ class BookSpines(Texture):
                 spine[row : row + stroke, left : left + half] = colors[1]
             row += stroke + int(rng.integers(1, 3))
         return spine
+
+
+@dataclass(frozen=True)
+class GlazedTiles(Texture):
+    """Equal tiles in straight joints, each of a slightly different shade: bathrooms, kitchens, ceilings."""
+
+    size: int
+    seed: int
+    palette: Palette
+    joint: Srgb
+    rows: int
+    """Even where there is a bond, so that it repeats."""
+    columns: int
+    bond: float
+    """Shift of every other row in tiles: 0.5 running bond, 0 stacked."""
+    joint_width: float
+    """Relative to a tile's height."""
+
+    popularity: ClassVar[float] = 0.0
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator, size: int) -> Self:
+        palette = sample_palette(rng, 3)
+        rows = 2 * integer(rng, 2, 6)
+        return cls(size, new_seed(rng), palette[1:], palette[0], rows, rows, 0.0, uniform(rng, 0.02, 0.06))
+
+    def image(self) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(self.seed)
+        x, y = unit_grid(self.size)
+        v = y * np.float32(self.rows)
+        row = np.floor(v).astype(np.int32)
+        u = x * np.float32(self.columns) + np.float32(self.bond) * (row % 2)
+        column = np.floor(u).astype(np.int32) % self.columns
+        tone = rng.random((self.rows, self.columns), np.float32)[row, column]
+        across = np.minimum(fraction(u), 1 - fraction(u)) * np.float32(self.rows / self.columns)
+        edge = np.minimum(across, np.minimum(fraction(v), 1 - fraction(v))).astype(np.float32)
+        face = smooth_step(edge, self.joint_width / 2, 1.5 * self.rows / self.size)
+        return finish(mix(paint(self.joint), colorize(tone, self.palette), face), rng, 0.004)
 
 
 @dataclass(frozen=True)

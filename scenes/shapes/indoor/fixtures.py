@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.geometry.building import Part, grid_triangles, slab_triangles
-from scenes.geometry.polyhedra import hexahedra
+from scenes.geometry.polyhedra import hexahedra, outward
 from scenes.random_draws import chance, choose, integer, new_seed, uniform
 from scenes.shapes.anchored import Surface
 from scenes.shapes.indoor.parts import IndoorShape, fronted, lathe, rod, slabs, surfaces
@@ -156,7 +156,8 @@ class Curtain(IndoorShape):
         z = np.linspace(self.height, 0.0, rows)[:, None]
         front = np.stack(np.broadcast_arrays(x[None, :], y, z), -1).reshape(-1, 3)
         back = front - np.array((0.0, 0.004, 0.0))
-        return np.concatenate([front, back]), slab_triangles(rows, columns)
+        vertices = np.concatenate([front, back])
+        return vertices, outward(vertices, slab_triangles(rows, columns))
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,7 @@ class Blind(IndoorShape):
 
     width: float
     height: float
-    kind: str
+    form: str
     """slats, vertical or roller."""
     let_down: float
     """Share of the window it covers, 0..1."""
@@ -186,12 +187,12 @@ class Blind(IndoorShape):
         head = slabs((-w, -0.03, h - 0.045, w, 0.03, h))
         low = h * (1 - self.let_down)
         tilt = np.radians(self.tilt_deg)
-        if self.kind == "roller":
+        if self.form == "roller":
             return surfaces(
                 fabric_blind=[slabs((-w, -0.002, low, w, 0.002, h - 0.03))],
                 plastic=[head, slabs((-w, -0.01, low - 0.02, w, 0.01, low))],
             )
-        if self.kind == "vertical":
+        if self.form == "vertical":
             wide = 0.045
             x = np.arange(-w + wide, w - wide, 0.08)
             across = np.stack([np.cos(tilt) * np.ones_like(x), np.sin(tilt) * np.ones_like(x)], -1) * wide
@@ -283,7 +284,7 @@ class Pipes(IndoorShape):
 class WallPlate(IndoorShape):
     """Switches, sockets, a clock or a grille on the wall, the anchor in the middle of its back."""
 
-    kind: str
+    form: str
     """switch, clock, grille or duct."""
     size: float
 
@@ -291,18 +292,21 @@ class WallPlate(IndoorShape):
     def sample(cls, rng: np.random.Generator) -> Self:
         kind = choose(rng, ["switch", "clock", "grille"])
         return cls(
-            kind, {"switch": 0.04, "clock": uniform(rng, 0.12, 0.2)}.get(kind, uniform(rng, 0.12, 0.3))
+            kind,
+            {"switch": uniform(rng, 0.036, 0.045), "clock": uniform(rng, 0.12, 0.2)}.get(
+                kind, uniform(rng, 0.12, 0.3)
+            ),
         )
 
     def parts(self) -> dict[str, Surface]:
         s = self.size
-        if self.kind == "switch":
+        if self.form == "switch":
             return surfaces(
                 plastic_white=[
                     slabs((-s, 0.0, -s, s, 0.009, s), (-0.6 * s, 0.009, -0.7 * s, 0.6 * s, 0.014, 0.7 * s))
                 ]
             )
-        if self.kind == "clock":
+        if self.form == "clock":
             face, rim = (
                 lathe(((s, 0.0), (s, 0.025)), sides=32),
                 lathe(((s + 0.012, 0.0), (s + 0.012, 0.02)), sides=32),
@@ -425,14 +429,15 @@ def _open_shade(radius: float, low: float, high: float) -> Part:
     theta = np.linspace(0, 2 * np.pi, 28, endpoint=False)
     ring = profile[None, :, :1] * np.stack([np.cos(theta), np.sin(theta)], -1)[:, None, :]
     points = np.concatenate([ring, np.broadcast_to(profile[None, :, 1:], (28, 4, 1))], axis=2)
-    return points.reshape(-1, 3), grid_triangles(28, 4, wrap_rows=True, wrap_columns=True)
+    vertices = points.reshape(-1, 3)
+    return vertices, outward(vertices, grid_triangles(28, 4, wrap_rows=True, wrap_columns=True))
 
 
 @dataclass(frozen=True)
 class CeilingLamp(IndoorShape):
     """A lamp under the ceiling; the anchor is on the ceiling, the lamp below it."""
 
-    kind: str
+    form: str
     """pendant, tube, panel or dome."""
     drop: float
     size: float
@@ -448,11 +453,11 @@ class CeilingLamp(IndoorShape):
     @property
     def light_below_m(self) -> float:
         """How far below the anchor the light comes from."""
-        return self.drop + (0.22 if self.kind == "pendant" else 0.1)
+        return self.drop + (0.22 if self.form == "pendant" else 0.1)
 
     def parts(self) -> dict[str, Surface]:
         s, d = self.size, self.drop
-        if self.kind == "pendant":
+        if self.form == "pendant":
             shade = _open_shade(s, -d - 0.2, -d)
             bulb = lathe(((0.015, -d - 0.02), (0.045, -d - 0.1), (0.03, -d - 0.15)), sides=14)
             cord = [
@@ -465,7 +470,7 @@ class CeilingLamp(IndoorShape):
                 for x, y in ((1, 0), (-0.5, 0.86), (-0.5, -0.86))
             ]
             return surfaces(lacquer_shade=[shade], glow_bulb=[bulb], metal=cord)
-        if self.kind == "tube":
+        if self.form == "tube":
             half = s / 2 + 0.3
             body = [slabs((-half, -0.06, -d - 0.05, half, 0.06, -d))]
             if d > 0.1:
@@ -477,7 +482,7 @@ class CeilingLamp(IndoorShape):
                 for y in (-0.03, 0.03)
             ]
             return surfaces(enamel=body, glow_tube=tubes)
-        if self.kind == "panel":
+        if self.form == "panel":
             half = 0.3
             frame = slabs((-half, -half, -0.03, half, half, 0.0))
             return surfaces(

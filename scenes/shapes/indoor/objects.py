@@ -145,7 +145,7 @@ _VESSEL_MADE_OF = {
 class Vessel(IndoorShape):
     """A turned thing: bottle, glass, cup, bowl, plate, vase, cooking pot, jar, candle."""
 
-    kind: str
+    form: str
     height: float
     slim: float
     """0.8 to 1.25: how wide it is for its height."""
@@ -171,7 +171,7 @@ class Vessel(IndoorShape):
     def _profile(self) -> list[tuple[float, float]]:
         """(radius, height) relative to the vessel's height, from the foot up the outside and down the inside."""
         a = self.lean
-        if self.kind == "bottle":
+        if self.form == "bottle":
             s = 0.5 + 0.15 * a
             return [
                 (0.13, 0.0),
@@ -183,10 +183,10 @@ class Vessel(IndoorShape):
                 (0.055, 0.96),
                 (0.055, 1.0),
             ]
-        if self.kind == "tumbler":
+        if self.form == "tumbler":
             r = 0.3 + 0.06 * a
             return [(r - 0.05, 0.0), (r, 1.0), (r - 0.025, 1.0), (r - 0.07, 0.08)]
-        if self.kind == "wineglass":
+        if self.form == "wineglass":
             r = 0.2 + 0.05 * a
             return [
                 (0.2, 0.0),
@@ -200,7 +200,7 @@ class Vessel(IndoorShape):
                 (r - 0.012, 0.7),
                 (0.11, 0.52),
             ]
-        if self.kind == "cup":
+        if self.form == "cup":
             r = 0.42 + 0.08 * a
             return [
                 (0.6 * r, 0.0),
@@ -210,7 +210,7 @@ class Vessel(IndoorShape):
                 (r - 0.1, 0.3),
                 (0.4 * r, 0.1),
             ]
-        if self.kind == "bowl":
+        if self.form == "bowl":
             r = 0.95 + 0.4 * a
             return [
                 (0.5, 0.0),
@@ -221,9 +221,9 @@ class Vessel(IndoorShape):
                 (0.75 * r, 0.45),
                 (0.4, 0.14),
             ]
-        if self.kind == "plate":
+        if self.form == "plate":
             return [(3.0, 0.0), (3.4, 0.25), (5.2, 0.85), (5.3, 1.0), (3.4, 0.45), (3.0, 0.3)]
-        if self.kind == "vase":
+        if self.form == "vase":
             b = 0.2 + 0.12 * a
             return [
                 (0.12, 0.0),
@@ -235,7 +235,7 @@ class Vessel(IndoorShape):
                 (b - 0.03, 0.3 + 0.2 * a),
                 (0.1, 0.05),
             ]
-        if self.kind == "pot":
+        if self.form == "pot":
             r = 0.55 + 0.25 * a
             return [
                 (r, 0.0),
@@ -247,7 +247,7 @@ class Vessel(IndoorShape):
                 (0.05, 0.93),
                 (0.1, 1.0),
             ]
-        if self.kind == "jar":
+        if self.form == "jar":
             r = 0.34 + 0.1 * a
             return [
                 (r - 0.02, 0.0),
@@ -268,7 +268,7 @@ class Vessel(IndoorShape):
     def parts(self) -> dict[str, Surface]:
         h = self.height
         body = [lathe([(r * h * self.slim, z * h) for r, z in self._profile()], sides=24)]
-        if self.kind == "cup":
+        if self.form == "cup":
             r = (0.4 + 0.08 * self.lean) * h * self.slim
             angle = np.linspace(-1.45, 1.45, 9)
             body.append(
@@ -281,7 +281,7 @@ class Vessel(IndoorShape):
                     6,
                 )
             )
-        if self.kind == "pot":
+        if self.form == "pot":
             r = (0.56 + 0.25 * self.lean) * h * self.slim
             body += [
                 rod(
@@ -295,7 +295,7 @@ class Vessel(IndoorShape):
                 )
                 for s in (-1, 1)
             ]
-        if self.kind == "bottle":
+        if self.form == "bottle":
             r = 0.1415 * h * self.slim
             label = lathe(((r, 0.12 * h), (r, 0.42 * h)), sides=24)
             return surfaces(**{self.made_of: body}, paper_label=[label])
@@ -329,7 +329,7 @@ class Carton(IndoorShape):
         )  # fmt: skip
         flaps = []
         for side in (-1.0, 1.0):
-            ring = np.array([(side * w, h), (side * (w + 0.4 * d), h + 0.25 * d)])
+            ring = np.array([(side * (w + 0.0005), h), (side * (w + 0.4 * d), h + 0.25 * d)])
             low = [(ring[0, 0], y, ring[0, 1] + dz) for y in (-d, d) for dz in (-t, 0.0)]
             high = [(ring[1, 0], y, ring[1, 1] + dz) for y in (-d, d) for dz in (-t, 0.0)]
             corners = np.array([low[0], low[1], low[3], low[2], high[0], high[1], high[3], high[2]])
@@ -420,8 +420,8 @@ class Basket(IndoorShape):
                 slabs(
                     (-w, -d - 0.006, z, w, -d, top),
                     (-w, d, z, w, d + 0.006, top),
-                    (-w - 0.006, -d, z, -w, d, top),
-                    (w, -d, z, w + 0.006, d, top),
+                    (-w - 0.006, -d - 0.003, z, -w, d + 0.003, top - 0.002),
+                    (w, -d - 0.003, z, w + 0.006, d + 0.003, top - 0.002),
                 )
             )
         bodies.append(slabs((-w, -d, 0.005, w, d, 0.012)))
@@ -432,8 +432,8 @@ def _ring(w: float, d: float, z: float, r: float) -> Part:
     return slabs(
         (-w - r, -d - r, z - r, w + r, -d + r, z + r),
         (-w - r, d - r, z - r, w + r, d + r, z + r),
-        (-w - r, -d, z - r, -w + r, d, z + r),
-        (w - r, -d, z - r, w + r, d, z + r),
+        (-w - 1.2 * r, -d, z - 0.9 * r, -w + 1.2 * r, d, z + 0.9 * r),
+        (w - 1.2 * r, -d, z - 0.9 * r, w + 1.2 * r, d, z + 0.9 * r),
     )
 
 
@@ -471,13 +471,15 @@ class Keyboard(IndoorShape):
 
     rows: int
     columns: int
+    pitch: float
+    """From key to key."""
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(integer(rng, 5, 6), integer(rng, 13, 20))
+        return cls(integer(rng, 5, 6), integer(rng, 13, 20), uniform(rng, 0.018, 0.021))
 
     def parts(self) -> dict[str, Surface]:
-        pitch = 0.0195
+        pitch = self.pitch
         w, d = self.columns * pitch / 2 + 0.008, self.rows * pitch / 2 + 0.008
         keys = []
         for row in range(self.rows):
@@ -538,7 +540,7 @@ class Laptop(IndoorShape):
 class Toy(IndoorShape):
     """A ball, a tower of blocks, a soft bear or a wooden train."""
 
-    kind: str
+    form: str
     size: float
     seed: int
 
@@ -548,9 +550,9 @@ class Toy(IndoorShape):
 
     def parts(self) -> dict[str, Surface]:
         rng, s = np.random.default_rng(self.seed), self.size
-        if self.kind == "ball":
+        if self.form == "ball":
             return surfaces(print=[cushion((-s / 2, -s / 2, 0.0, s / 2, s / 2, s), 2.0)])
-        if self.kind == "bear":
+        if self.form == "bear":
             fur = [
                 cushion((-0.3 * s, -0.22 * s, 0.0, 0.3 * s, 0.26 * s, 0.62 * s), 2.2),
                 cushion((-0.22 * s, -0.16 * s, 0.55 * s, 0.22 * s, 0.24 * s, 0.98 * s), 2.2),
@@ -578,7 +580,7 @@ class Toy(IndoorShape):
                     cushion((-0.03 * s, 0.22 * s, 0.68 * s, 0.03 * s, 0.27 * s, 0.73 * s), 2.0),
                 ],
             )
-        if self.kind == "train":
+        if self.form == "train":
             wagons, wheels = [], []
             for k in range(3):
                 x = (k - 1) * 0.9 * s
@@ -616,7 +618,7 @@ class Toy(IndoorShape):
 class Tool(IndoorShape):
     """A tool lying or standing about: hammer, pliers, drill, toolbox, spray can, tape."""
 
-    kind: str
+    form: str
     size: float
 
     @classmethod
@@ -627,17 +629,17 @@ class Tool(IndoorShape):
 
     def parts(self) -> dict[str, Surface]:
         s = self.size
-        if self.kind == "hammer":
+        if self.form == "hammer":
             return surfaces(
                 wood=[rod(((0.0, -0.14 * s, 0.017), (0.0, 0.14 * s, 0.017)), 0.014)],
                 metal=[slabs((-0.055 * s, 0.12 * s, 0.0, 0.055 * s, 0.15 * s, 0.034))],
             )
-        if self.kind == "screwdriver":
+        if self.form == "screwdriver":
             return surfaces(
                 plastic=[rod(((0.0, -0.1 * s, 0.014), (0.0, 0.0, 0.014)), 0.014)],
                 chrome=[rod(((0.0, -0.01, 0.014), (0.0, 0.13 * s, 0.014)), 0.003, 6)],
             )
-        if self.kind == "drill":
+        if self.form == "drill":
             v, t = lathe(((0.03, -0.1), (0.035, -0.08), (0.035, 0.06), (0.022, 0.08)), sides=16)
             barrel = (np.stack([v[:, 2] * s, v[:, 0] * s, v[:, 1] * s + 0.19 * s], -1), t)
             bit = rod(((0.08 * s, 0.0, 0.19 * s), (0.2 * s, 0.0, 0.19 * s)), 0.004, 6)
@@ -646,7 +648,7 @@ class Tool(IndoorShape):
                 (-0.07 * s, -0.035 * s, 0.0, 0.05 * s, 0.035 * s, 0.055 * s),
             )
             return surfaces(plastic=[barrel], plastic_black=[grip], chrome=[bit])
-        if self.kind == "toolbox":
+        if self.form == "toolbox":
             handle = rod(((-0.1, 0.0, 0.2), (-0.08, 0.0, 0.25), (0.08, 0.0, 0.25), (0.1, 0.0, 0.2)), 0.01, 6)
             return surfaces(
                 lacquer=[
@@ -663,7 +665,7 @@ class Tool(IndoorShape):
                 ],
                 plastic_black=[handle],
             )
-        if self.kind == "reel":
+        if self.form == "reel":
             ring = lathe(
                 (
                     (0.09 * s, 0.0),

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.geometry.building import Part, joined, revolve, struts, tube
-from scenes.geometry.polyhedra import boxes
+from scenes.geometry.polyhedra import boxes, outward
 from scenes.shapes.anchored import Frame, MetricShape, Surface
 from scenes.shapes.solids.basic import cube_grid
 from stereoforge_kit.errors import InputError
@@ -111,7 +111,7 @@ def lathe(
     """The body of revolution of (radius, height) points, upright at a place; closed on its axis at both ends."""
     points = np.array([(0.0, profile[0][1]), *profile, (0.0, profile[-1][1])])
     vertices, triangles = revolve(points[:, 0], points[:, 1], sides)
-    return vertices + np.array(at), triangles
+    return vertices + np.array(at), outward(vertices, triangles)
 
 
 def rod(path: Sequence[tuple[float, float, float]], radius: float, sides: int = 8) -> Part:
@@ -128,7 +128,7 @@ def rod(path: Sequence[tuple[float, float, float]], radius: float, sides: int = 
 def _rounded_cube(cells: int, power: float) -> Part:
     vertices, triangles = cube_grid(cells)
     gauge = (np.abs(vertices) ** power).sum(axis=1) ** (1 / power)
-    return vertices / gauge[:, None], triangles
+    return vertices / gauge[:, None], outward(vertices, triangles)
 
 
 def cushion(corners: BoxCorners, power: float = 6.0) -> Part:

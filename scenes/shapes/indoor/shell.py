@@ -278,9 +278,9 @@ class Hallway(IndoorShape):
     def parts(self) -> dict[str, Surface]:
         w, h, near, far = self.width / 2, self.height, -self.thickness, -self.thickness - self.depth
         walls = slabs(
-            (-w, far - 0.1, 0.0, w, far, h),
-            (-w - 0.1, far, 0.0, -w, near, h),
-            (w, far, 0.0, w + 0.1, near, h),
+            (-w - 0.05, far - 0.1, 0.0, w + 0.05, far, h),
+            (-w - 0.1, far - 0.05, 0.0, -w, near, h),
+            (w, far - 0.05, 0.0, w + 0.1, near, h),
         )
         return surfaces(
             wall=[walls],

@@ -305,6 +305,15 @@ def test_all_targets_are_there_and_agree_among_themselves(dataset: Path) -> None
         for view in VIEWS:
             arrays = sample.view(view)
             assert np.array_equal(sample.material_index(view), materials[arrays.object_index])
+            shiny = [
+                k
+                for k, thing in enumerate(sample.scene_record.objects, 1)
+                if (material := sample.scene_record.materials[thing.material]).metallic > 0
+                or material.transmission > 0
+                or (material.specular > 0 and material.roughness <= 0.35)
+            ]
+            assert np.array_equal(sample.reflective(view), 255 * np.isin(arrays.object_index, shiny))
+            assert set(np.unique(sample.reflective(view))) == {0, 255}
             length = np.linalg.norm(sample.normals(view), axis=-1)
             assert (np.abs(length[arrays.object_index > 0] - 1) < 1e-5).mean() > 0.99  # silhouettes are ties
             assert (length[arrays.object_index == 0] == 0).mean() > 0.99
@@ -338,6 +347,7 @@ def test_verify_finds_targets_that_are_not_of_the_scene(dataset: Path, tmp_path:
     turned = sample.normals("left") * np.float32([1, -1, 1])
     mistakes: list[tuple[str, Direction | None, Callable[[Path, Any], None], Any]] = [
         ("material_index", None, write_png, sample.material_index("right")),
+        ("reflective", None, write_png, np.uint8(255) - sample.reflective("left")),
         ("normals", None, write_normals, turned),
         ("depth", None, write_depth, sample.depth("left") * np.float32(1.001)),
         ("depth", None, write_depth, np.minimum(sample.depth("left"), np.float32(1e4))),
@@ -400,10 +410,13 @@ def test_targets_are_read_and_what_follows_from_others_compared_without_rays_too
 ) -> None:
     root = Path(shutil.copytree(dataset, tmp_path / "set"))
     layout, sample = Layout(root), StereoDataset(root, "train")[0]
-    direction: Direction | None = None if kind in ("depth", "material_index", "normals") else "into_past"
+    still = ("depth", "material_index", "reflective", "normals")
+    direction: Direction | None = None if kind in still else "into_past"
     path = layout.file(kind, "train", 0, "left", sample.frame, direction)
     if kind == "material_index":
         write_png(path, sample.material_index("left") + np.uint16(1))
+    elif kind == "reflective":
+        write_png(path, np.uint8(255) - sample.reflective("left"))
     elif kind == "motion_boundaries":
         write_mask(path, ~sample.motion_boundaries("left", "into_past"))
     else:
