@@ -52,9 +52,9 @@ class IndoorConfig(FamilyConfig):
     camera_turn_deg: Range = (0.0, 0.8)
     """How fast the camera turns, degrees per frame."""
 
-    plain_share: float = 0.85
+    plain_share: float = 0.88
     """How many of the walls, floors, cloths and fronts that come both ways are of one colour."""
-    glossy_share: float = 0.22
+    glossy_share: float = 0.18
     """How many of the surfaces that come both ways are varnished, lacquered, glazed or polished."""
     metallic_share: float = 0.5
     """How many of the parts made of metal are bare."""

@@ -173,7 +173,7 @@ def _bed(rng: np.random.Generator, interior: Interior) -> None:
 
 def _kitchen_row(rng: np.random.Generator, interior: Interior) -> None:
     row = storage.KitchenRow.sample(rng)
-    low = storage.KitchenRow(3, 0, 2, False, row.front)
+    low = storage.KitchenRow(3, 0, 2, False, row.front, row.stretch)
     for shape in (row, replace(row, upper=False), low):
         if interior.try_at_wall(rng, "kitchen", shape, tries=20) is not None:
             break
@@ -219,22 +219,19 @@ def _ceiling_lamps(rng: np.random.Generator, interior: Interior) -> None:
 
 
 def _stairs(rng: np.random.Generator, interior: Interior) -> None:
-    """A flight along the wall x = 0 that leads up to a gallery across the room's end."""
+    """A flight along the wall x = 0 that leads up to a gallery along the wall y = 0."""
     plan = interior.plan
     stairs = Stairs.up_to(rng, plan.height / 2 + uniform(rng, 0.0, 0.15))
+    stairs = replace(stairs, tread=min(stairs.tread, (plan.depth - 1.7) / stairs.steps))
     level = stairs.steps * stairs.rise
-    start = plan.depth - 1.2 - stairs.length
-    if start < 0.4:
-        return
-    # The flight's own x axis runs along the wall, towards +y of the room; its wall side is at x = 0.
-    mirrored = (0.0, start, 0.0)
-    interior.put(rng, "stairs", stairs, (stairs.width, mirrored[1], 0.0), math.pi / 2)
+    # The flight's own x axis runs along the wall, towards -y of the room; its railing is towards the room.
+    interior.put(rng, "stairs", stairs, (0.0, 1.2 + stairs.length, 0.0), -math.pi / 2)
     gallery = RoomSlab(plan.width - 0.5, 0.7, "floor")
-    interior.put(rng, "gallery", gallery, (0.25, plan.depth - 0.95, level), 0.0)
+    interior.put(rng, "gallery", gallery, (0.25, 0.25, level), 0.0)
     rail = plan.width - stairs.width - 0.1
     if rail > 0.8:
         shape = Railing(rail, uniform(rng, 0.9, 1.05), uniform(rng, 0.08, 0.13))
-        place = (stairs.width + 0.05 + rail / 2, plan.depth - 1.16, level)
+        place = (stairs.width + 0.05 + rail / 2, 1.16, level)
         interior.put(rng, "railing", shape, place)
 
 

@@ -17,8 +17,8 @@ from scenes.shapes.indoor.shell import Opening
 
 WALL_M = 0.25
 """Thickness of the walls."""
-_STAIR_WALLS = (2, 3)
-"""Walls without openings where there are stairs: the flight is at one, the gallery at the other."""
+_STAIR_WALLS = (0, 3)
+"""Walls without openings where there are stairs: the gallery is at one, the flight at the other."""
 
 
 @dataclass(frozen=True)

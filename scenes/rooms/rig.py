@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.motion.trajectories import vector, wander
+from scenes.placement.boxes import OrientedBox
 from scenes.placement.view import View
 from scenes.random_draws import chance, choose, log_uniform, uniform
 from scenes.rooms.config import IndoorConfig
@@ -17,15 +18,19 @@ from scenes.rooms.interior import Extent, Interior
 from scenes.rooms.plan import Plan
 from scenes.spec import StereoCamera, Trajectory
 
-_CANDIDATES = 60
+_CANDIDATES = 120
 _MARGIN_M = 0.2
-"""Between the rig and walls or furniture."""
+"""Between the rig and furniture, besides the clearance; it may wander by half of this."""
+_WALL_MARGIN_M = 0.15
+"""Between a camera and a wall."""
+_LARGE_M3 = 0.02
+"""Things with a larger box than this are never left out, since others may stand on them."""
 
 
 def sample_camera(rng: np.random.Generator, config: IndoorConfig, interior: Interior) -> StereoCamera:
     """Draw a camera that stands free and sees much of the room.
 
-    The baseline is so small that walls, floor and ceiling keep within the largest disparity allowed.
+    The baseline is so small that the room and its furniture keep within the largest disparity allowed.
     """
     plan = interior.plan
     focal_mm = log_uniform(rng, *config.focal_mm)
@@ -37,7 +42,7 @@ def sample_camera(rng: np.random.Generator, config: IndoorConfig, interior: Inte
     best: list[tuple[float, NDArray[np.float64], Rotation]] = []
     for _ in range(_CANDIDATES):
         place, turn = _candidate(rng, plan, carrier)
-        if _stands_free(place, baseline_m, turn, interior):
+        if _stands_free(place, baseline_m, turn, interior, config.clearance_m):
             best.append((_interest(place, turn, focal_mm, centres, plan), place, turn))
     if not best:
         place, turn = _candidate(rng, plan, carrier)
@@ -45,7 +50,9 @@ def sample_camera(rng: np.random.Generator, config: IndoorConfig, interior: Inte
     best.sort(key=lambda item: -item[0])
     _, place, turn = best[int(rng.integers(min(5, len(best))))]
     still = StereoCamera(config.width, config.height, focal_mm, baseline_m, Trajectory.static(vector(place)))
-    depth_m = nearest_shell_m(plan, still, place, turn)
+    depth_m = min(
+        _nearest_shell_m(plan, still, place, turn), _nearest_furniture_m(interior, still, place, turn)
+    )
     baseline_m = min(
         baseline_m, 0.95 * config.largest_disparity_share * config.width * depth_m / still.focal_px
     )
@@ -83,11 +90,16 @@ def _candidate(rng: np.random.Generator, plan: Plan, carrier: str) -> tuple[NDAr
     return place, attitude
 
 
-def _stands_free(place: NDArray[np.float64], baseline_m: float, turn: Rotation, interior: Interior) -> bool:
+def _stands_free(
+    place: NDArray[np.float64], baseline_m: float, turn: Rotation, interior: Interior, clearance_m: float
+) -> bool:
     right = place + turn.apply((baseline_m, 0.0, 0.0))
-    low, high = np.minimum(place, right) - _MARGIN_M, np.maximum(place, right) + _MARGIN_M
+    margin = clearance_m + _MARGIN_M
+    low, high = np.minimum(place, right) - margin, np.maximum(place, right) + margin
     plan = interior.plan
-    if (low[:2] < 0.05).any() or high[0] > plan.width - 0.05 or high[1] > plan.depth - 0.05:
+    room = np.array((plan.width, plan.depth))
+    ends = np.stack([place, right])[:, :2]
+    if (ends < _WALL_MARGIN_M).any() or (ends > room - _WALL_MARGIN_M).any():
         return False
     return interior.meets_none(Extent(low, high))
 
@@ -116,7 +128,25 @@ def _to_shell(plan: Plan, place: NDArray[np.float64], rays: NDArray[np.float64])
     return nearest
 
 
-def nearest_shell_m(plan: Plan, camera: StereoCamera, place: NDArray[np.float64], turn: Rotation) -> float:
+def _nearest_furniture_m(
+    interior: Interior, camera: StereoCamera, place: NDArray[np.float64], turn: Rotation
+) -> float:
+    """The least depth at which a camera sees the box of a piece of furniture; infinite where it sees none."""
+    large = [t.extent for t in interior.placed if np.prod(t.extent.high - t.extent.low) > _LARGE_M3]
+    if not large:
+        return math.inf
+    points = np.concatenate(
+        [OrientedBox((e.low + e.high) / 2, (e.high - e.low) / 2, np.eye(3)).surface_points for e in large]
+    )
+    x, y, z = turn.inv().apply(points - place).T
+    half_x, half_y = View(camera, 1).half_view
+    # As `scenes.placement.clearance` has it, with a little more on all sides.
+    near = np.abs(x - camera.baseline_m / 2) < -1.15 * half_x * z + camera.baseline_m / 2 + 0.05
+    seen = (z < -0.01) & near & (np.abs(y) < -1.15 * half_y * z + 0.05)
+    return float(-z[seen].max()) if seen.any() else math.inf
+
+
+def _nearest_shell_m(plan: Plan, camera: StereoCamera, place: NDArray[np.float64], turn: Rotation) -> float:
     """The least depth at which a camera sees the room's walls, floor or ceiling, without what is in the room."""
     half_x, half_y = View(camera, 1).half_view
     across, up = np.meshgrid(np.linspace(-half_x, half_x, 13), np.linspace(-half_y, half_y, 9))

@@ -256,24 +256,35 @@ class KitchenRow(IndoorShape):
     upper: bool
     """Whether there are wall cupboards."""
     front: str
+    stretch: float
+    """Width of the cupboards relative to 0.6 m."""
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
         units = integer(rng, 3, 6)
         sink = integer(rng, 0, units - 1)
         hob = choose(rng, [k for k in range(units) if k != sink])
-        return cls(units, sink, hob, chance(rng, 0.75), choose(rng, ["lacquer", "wood"], [0.7, 0.3]))
-
-    @property
-    def width(self) -> float:
-        """Of the whole row."""
-        return 0.6 * self.units
+        return cls(
+            units,
+            sink,
+            hob,
+            chance(rng, 0.75),
+            choose(rng, ["lacquer", "wood"], [0.7, 0.3]),
+            uniform(rng, 0.92, 1.05),
+        )
 
     def _x(self, unit: int) -> float:
-        return -self.width / 2 + 0.6 * unit
+        """Left end of a cupboard before all is stretched."""
+        return 0.6 * (unit - self.units / 2)
 
     def parts(self) -> dict[str, Surface]:
-        w = self.width / 2
+        wider = np.array((self.stretch, 1.0, 1.0))
+        return {
+            name: Surface(part.vertices * wider, part.triangles) for name, part in self._unstretched().items()
+        }
+
+    def _unstretched(self) -> dict[str, Surface]:
+        w = 0.3 * self.units
         fronts: list[Part] = [slabs((-w, 0.0, 0.1, w, 0.54, 0.86))]
         handles: list[Part] = []
         for unit in range(self.units):
@@ -317,7 +328,7 @@ class KitchenRow(IndoorShape):
 
     def _worktop(self) -> Part:
         """The worktop around the sink's hole."""
-        w, x = self.width / 2, self._x(self.sink)
+        w, x = 0.3 * self.units, self._x(self.sink)
         return slabs(
             (-w, 0.0, 0.86, x + 0.06, 0.6, 0.9),
             (x + 0.54, 0.0, 0.86, w, 0.6, 0.9),
@@ -366,16 +377,17 @@ class KitchenRow(IndoorShape):
         return handles
 
     def tops(self) -> tuple[Top, ...]:
+        k = self.stretch
         taken = sorted((self.sink, self.hob))
         edges = [-1, *taken, self.units]
         room = 0.5 if self.upper else 0.7
         free = [
-            Top((self._x(a + 1) + 0.03, 0.04), (self._x(b) - 0.03, 0.56), 0.9, room)
+            Top((k * (self._x(a + 1) + 0.03), 0.04), (k * (self._x(b) - 0.03), 0.56), 0.9, room)
             for a, b in itertools.pairwise(edges)
             if b - a > 1
         ]
         x = self._x(self.hob)
-        return (*free, Top((x + 0.05, 0.1), (x + 0.55, 0.52), 0.913, 0.4))
+        return (*free, Top((k * (x + 0.05), 0.1), (k * (x + 0.55), 0.52), 0.913, 0.4))
 
 
 @dataclass(frozen=True)

@@ -121,6 +121,30 @@ def test_floating_objects_float_free(rooms: list[Scene]) -> None:
     assert floated > 5
 
 
+def test_nothing_is_left_in_the_air_by_leaving_out_what_carries_it(rooms: list[Scene]) -> None:
+    rested = 0
+    for scene in rooms:
+        things: defaultdict[str, list[NDArray[np.float64]]] = defaultdict(list)
+        for thing in scene.objects:
+            things[" ".join(thing.name.split()[:2])].append(corners(thing, 0.0))
+        boxes = {name: np.concatenate(points) for name, points in things.items()}
+        ends = {name: (points.min(axis=0), points.max(axis=0)) for name, points in boxes.items()}
+        for name, (low, high) in ends.items():
+            if not name.startswith(("thing", "television", "screen", "keyboard")) or low[2] < 0.02:
+                continue
+            middle = (low + high)[:2] / 2
+            assert any(
+                other != name
+                and (middle > other_low[:2]).all()
+                and (middle < other_high[:2]).all()
+                and other_low[2] < low[2] - 0.01
+                and other_high[2] > low[2] - 0.02
+                for other, (other_low, other_high) in ends.items()
+            ), name
+            rested += 1
+    assert rested > 40
+
+
 @pytest.mark.slow
 def test_disparities_are_those_of_rooms() -> None:
     still = dataclasses.replace(SMALL, frames=1)
