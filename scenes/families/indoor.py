@@ -45,13 +45,17 @@ def sample_indoor(rng: np.random.Generator, config: IndoorConfig) -> Scene:
         add_outside(rng, interior)
     scene = interior.assembly
     floating = _floating(rng, config, interior, camera)
-    kept = keep_clear(
-        [*scene.groups[shell:], *floating],
-        camera,
-        config.frames,
-        clearance_m=config.clearance_m,
-        nearest_m=camera.disparity_metres / (config.largest_disparity_share * config.width),
+    clear = (
+        keep_clear(
+            groups,
+            camera,
+            config.frames,
+            clearance_m=config.clearance_m,
+            nearest_m=camera.disparity_metres / (config.largest_disparity_share * config.width),
+        )
+        for groups in (scene.groups[shell:], floating)
     )
+    kept = [*interior.carried(next(clear)), *next(clear)]
     return Scene(
         family="indoor",
         frames=config.frames,

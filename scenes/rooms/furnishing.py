@@ -148,9 +148,9 @@ def _desk(rng: np.random.Generator, interior: Interior) -> None:
         extent = extent_of(screen, place, desk.yaw)
         inside = abs(middle + k * 0.72 - 0.1) + screen.width / 2 < shape.width / 2
         if inside and interior.meets_none(extent, desk):
-            interior.put(rng, "screen", screen, place, desk.yaw)
+            interior.put(rng, "screen", screen, place, desk.yaw, base=desk)
     keys = interior.to_world(desk, middle - 0.1, shape.depth - 0.2)
-    interior.put(rng, "keyboard", objects.Keyboard.sample(rng), (*keys, top.z), desk.yaw)
+    interior.put(rng, "keyboard", objects.Keyboard.sample(rng), (*keys, top.z), desk.yaw, base=desk)
     seat = interior.to_world(desk, middle, shape.depth + uniform(rng, 0.1, 0.5))
     chair = seating.OfficeChair.sample(rng) if chance(rng, 0.75) else seating.Chair.sample(rng)
     interior.try_near(rng, "chair", chair, seat, desk.yaw + math.pi + rng.normal(0.0, 0.4), besides=desk)
@@ -225,7 +225,7 @@ def _stairs(rng: np.random.Generator, interior: Interior) -> None:
     stairs = replace(stairs, tread=min(stairs.tread, (plan.depth - 1.7) / stairs.steps))
     level = stairs.steps * stairs.rise
     # The flight's own x axis runs along the wall, towards -y of the room; its railing is towards the room.
-    interior.put(rng, "stairs", stairs, (0.0, 1.2 + stairs.length, 0.0), -math.pi / 2)
+    interior.put(rng, "stairs", stairs, (0.0, 1.24 + stairs.length, 0.0), -math.pi / 2)
     gallery = RoomSlab(plan.width - 0.5, 0.7, "floor")
     interior.put(rng, "gallery", gallery, (0.25, 0.25, level), 0.0)
     rail = plan.width - stairs.width - 0.1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.appearance.room_materials import RoomMaterials
-from scenes.placement.assembly import Assembly, anchored_object
+from scenes.placement.assembly import Assembly, ObjectGroup, anchored_object
 from scenes.random_draws import uniform
 from scenes.rooms.plan import Plan
 from scenes.shapes.anchored import frame_of
@@ -40,6 +41,8 @@ class Placed:
     place: tuple[float, float, float]
     yaw: float
     extent: Extent
+    group: int
+    """Its number among `Assembly.groups`."""
 
 
 def extent_of(shape: IndoorShape, place: tuple[float, float, float], yaw: float) -> Extent:
@@ -65,6 +68,8 @@ class Interior:
         self.kept_free: list[Extent] = []
         """Where nothing may stand: before doors and windows."""
         self._numbers: dict[str, int] = {}
+        self._bases: dict[int, int] = {}
+        """What carries a thing, both as numbers among `Assembly.groups`."""
         self._taken: list[tuple[float, ...]] = []
         """Extents of `placed`: their lower corners, then their upper ones."""
 
@@ -77,8 +82,15 @@ class Interior:
         yaw: float = 0.0,
         *,
         solid: bool = True,
+        base: Placed | None = None,
     ) -> Placed:
-        """Add a thing with a material for each of its parts; others keep away from it where it is `solid`."""
+        """Add a thing with a material for each of its parts; others keep away from it where it is `solid`.
+
+        base: What carries it, if that is not the room.
+        """
+        group = len(self.assembly.groups)
+        if base is not None:
+            self._bases[group] = base.group
         number = self._numbers.get(name, 0)
         self._numbers[name] = number + 1
         turn = Rotation.from_euler("Z", yaw)
@@ -88,7 +100,7 @@ class Interior:
             full = f"{name} {number} {part}"
             parts.append(anchored_object(full, replace(shape, only=part), material, [place], [turn]))
         self.assembly.add(*parts)
-        placed = Placed(shape, place, yaw, extent_of(shape, place, yaw))
+        placed = Placed(shape, place, yaw, extent_of(shape, place, yaw), group)
         if solid:
             self.placed.append(placed)
             self._taken.append((*placed.extent.low.tolist(), *placed.extent.high.tolist()))
@@ -216,8 +228,14 @@ class Interior:
             )
             extent = extent_of(shape, place, base.yaw + yaw)
             if self.meets_none(extent, base):
-                return self.put(rng, name, shape, place, base.yaw + yaw)
+                return self.put(rng, name, shape, place, base.yaw + yaw, base=base)
         return None
+
+    def carried(self, kept: Sequence[ObjectGroup]) -> list[ObjectGroup]:
+        """Those of the things kept whose carriers are kept too."""
+        numbers = {id(group): number for number, group in enumerate(self.assembly.groups)}
+        there = {numbers[id(group)] for group in kept}
+        return [group for group in kept if self._bases.get(numbers[id(group)], numbers[id(group)]) in there]
 
     def to_world(self, base: Placed, x: float, y: float) -> tuple[float, float]:
         """World x, y of a place given in the coordinates of a thing."""

@@ -550,7 +550,7 @@ class Stairs(IndoorShape):
         stringers: list[Part] = []
         if self.open:
             stringers += [
-                rod(((0.0, y, 0.02), (self.length - t, y, self.steps * r - 0.12)), 0.05, 4)
+                rod(((0.0, y, 0.06), (self.length - t, y, self.steps * r - 0.12)), 0.05, 4)
                 for y in (0.05, w - 0.08)
             ]
         return surfaces(
