@@ -324,9 +324,12 @@ class Carton(IndoorShape):
             return surfaces(cardboard=[slabs((-w, -d, 0.0, w, d, h))], plastic_tape=[tape])
         t = 0.004
         walls = slabs(
-            (-w, -d, 0.0, w, d, t), (-w, -d, 0.0, -w + t, d, h), (w - t, -d, 0.0, w, d, h),
-            (-w, -d, 0.0, w, -d + t, h), (-w, d - t, 0.0, w, d, h),
-        )  # fmt: skip
+            (-w + t / 2, -d + t / 2, 0.0002, w - t / 2, d - t / 2, t),
+            (-w + 0.0003, -d + t / 2, 0.0001, -w + t, d - t / 2, h - 0.0002),
+            (w - t, -d + t / 2, 0.0001, w - 0.0003, d - t / 2, h - 0.0002),
+            (-w, -d, 0.0, w, -d + t, h),
+            (-w, d - t, 0.0, w, d, h),
+        )
         flaps = []
         for side in (-1.0, 1.0):
             ring = np.array([(side * (w + 0.0005), h), (side * (w + 0.4 * d), h + 0.25 * d)])
@@ -401,7 +404,7 @@ class Basket(IndoorShape):
             ]
             bodies += [
                 slabs(*((s * w - 0.002, y - 0.002, 0.0, s * w + 0.002, y + 0.002, h) for s in (-1, 1)))
-                for y in np.linspace(-d, d, across).tolist()
+                for y in np.linspace(-d, d, across + 2)[1:-1].tolist()
             ]
             bodies += [_ring(w, d, z, 0.0025) for z in levels]
             return surfaces(**{self.made_of: bodies})

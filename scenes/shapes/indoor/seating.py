@@ -149,10 +149,10 @@ class OfficeChair(IndoorShape):
             base.append(rod(((0.0, 0.0, 0.11), (x, y, 0.075)), 0.018, 6))
             wheels.append(lathe(((0.026, 0.0), (0.03, 0.02), (0.03, 0.045), (0.014, 0.06)), (x, y, 0.0), 10))
         if self.arms:
+            wheels.append(slabs((-0.27, -0.03, h - 0.05, 0.27, 0.03, h - 0.02)))
             for x in (-0.27, 0.27):
                 wheels.append(slabs((x - 0.03, -0.12, h + 0.2, x + 0.03, 0.14, h + 0.23)))
                 wheels.append(slabs((x - 0.015, -0.03, h - 0.02, x + 0.015, 0.03, h + 0.2)))
-                wheels.append(slabs((min(x, 0.0), -0.03, h - 0.05, max(x, 0.0), 0.03, h - 0.02)))
         wheels.append(rod(((0.0, -0.1, h - 0.04), (0.0, -0.27, h + 0.02), (0.0, -0.27, h + 0.25)), 0.02, 6))
         cover = [
             cushion((-0.25, -0.24, h - 0.04, 0.25, 0.25, h + 0.05), 5.0),
