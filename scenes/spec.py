@@ -109,7 +109,7 @@ class Material:
     """Share of the light refracted through the surface. Ground truth is of the surface itself nonetheless."""
     emission: float = 0.0
     """Emitted radiance, multiplied by the base colour."""
-    thin: bool = field(default=False, metadata={"omit_default": True})
+    thin: bool = field(default=False, metadata=OMIT_DEFAULT)
     """A sheet that light passes straight through, its share being `transmission`: window panes."""
 
     @property
@@ -368,7 +368,7 @@ class World:
 
     environment: Texture
     strength: float = 1.0
-    sampled: bool = field(default=True, metadata={"omit_default": True})
+    sampled: bool = field(default=True, metadata=OMIT_DEFAULT)
     """Whether surfaces look for its light; in a room, which sees little of it, that is mostly in vain."""
 
 

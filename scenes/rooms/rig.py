@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from scenes.motion.trajectories import vector, wander
+from scenes.motion.trajectories import wander
 from scenes.placement.boxes import OrientedBox
 from scenes.placement.view import View
 from scenes.random_draws import chance, choose, log_uniform, uniform
@@ -24,17 +23,19 @@ _MARGIN_M = 0.2
 _WALL_MARGIN_M = 0.15
 """Between a camera and a wall."""
 _LARGE_M3 = 0.02
-"""Things with a larger box than this are never left out, since others may stand on them."""
+"""Things with a larger box than this limit the baseline; smaller ones that come too near are left out."""
 
 
 def sample_camera(rng: np.random.Generator, config: IndoorConfig, interior: Interior) -> StereoCamera:
     """Draw a camera that stands free and sees much of the room.
 
-    The baseline is so small that the room and its furniture keep within the largest disparity allowed.
+    The baseline is so small that the room and its furniture keep within the largest disparity allowed; a rig of the
+    user's own stays as it is.
     """
     plan = interior.plan
     focal_mm = log_uniform(rng, *config.focal_mm)
-    baseline_m = log_uniform(rng, *config.baseline_m)
+    drawn = config.camera(focal_mm, log_uniform(rng, *config.baseline_m), Trajectory.static())
+    baseline_m = drawn.baseline_m
     carrier = choose(
         rng, ["person", "tripod", "robot"], [config.person_share, *((1 - config.person_share) / 2,) * 2]
     )
@@ -43,18 +44,17 @@ def sample_camera(rng: np.random.Generator, config: IndoorConfig, interior: Inte
     for _ in range(_CANDIDATES):
         place, turn = _candidate(rng, plan, carrier)
         if _stands_free(place, baseline_m, turn, interior, config.clearance_m):
-            best.append((_interest(place, turn, focal_mm, centres, plan), place, turn))
+            best.append((_interest(place, turn, View(drawn, 1).half_view, centres, plan), place, turn))
     if not best:
         place, turn = _candidate(rng, plan, carrier)
         best.append((0.0, place, turn))
     best.sort(key=lambda item: -item[0])
     _, place, turn = best[int(rng.integers(min(5, len(best))))]
-    still = StereoCamera(config.width, config.height, focal_mm, baseline_m, Trajectory.static(vector(place)))
     depth_m = min(
-        _nearest_shell_m(plan, still, place, turn), _nearest_furniture_m(interior, still, place, turn)
+        _nearest_shell_m(plan, drawn, place, turn), _nearest_furniture_m(interior, drawn, place, turn)
     )
     baseline_m = min(
-        baseline_m, 0.95 * config.largest_disparity_share * config.width * depth_m / still.focal_px
+        baseline_m, 0.95 * config.largest_disparity_share * config.width * depth_m / drawn.focal_px
     )
     motion = wander(
         rng,
@@ -66,7 +66,7 @@ def sample_camera(rng: np.random.Generator, config: IndoorConfig, interior: Inte
         reach_m=0.5 * _MARGIN_M,
         reach_deg=3.0,
     )
-    return replace(still, baseline_m=baseline_m, motion=motion)
+    return config.camera(focal_mm, baseline_m, motion)
 
 
 def _candidate(rng: np.random.Generator, plan: Plan, carrier: str) -> tuple[NDArray[np.float64], Rotation]:
@@ -105,15 +105,19 @@ def _stands_free(
 
 
 def _interest(
-    place: NDArray[np.float64], turn: Rotation, focal_mm: float, centres: NDArray[np.float64], plan: Plan
+    place: NDArray[np.float64],
+    turn: Rotation,
+    half_view: tuple[float, float],
+    centres: NDArray[np.float64],
+    plan: Plan,
 ) -> float:
     """How much a view shows: things in it at middle distances; less where the nearest wall fills it."""
     if not len(centres):
         return 0.0
     local = turn.inv().apply(centres - place)
     depth = -local[:, 2]
-    half = 16.0 / focal_mm
-    seen = (depth > 0.5) & (np.abs(local[:, 0]) < half * depth) & (np.abs(local[:, 1]) < 0.6 * half * depth)
+    inside = (np.abs(local[:, :2]) < np.array(half_view) * depth[:, None]).all(axis=1)
+    seen = (depth > 0.5) & inside
     ahead = -turn.as_matrix()[:, 2]
     wall = _to_shell(plan, place, ahead[None])[0]
     return float(np.sqrt(np.minimum(1.0, 2.0 / depth[seen])).sum()) * min(1.0, wall / 2.5)

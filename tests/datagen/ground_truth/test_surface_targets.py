@@ -27,7 +27,7 @@ from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, Scene
 from scenes.motion.trajectories import quaternion
 from scenes.shapes.solids.basic import Plane
-from scenes.spec import Deformation, Material, Rig, SceneObject, Trajectory, World
+from scenes.spec import Deformation, Material, Rig, SceneObject, StereoCamera, Trajectory, World
 from scenes.textures.plain import SolidColor
 from tests.datagen.worlds import plates
 
