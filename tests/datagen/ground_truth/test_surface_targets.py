@@ -23,6 +23,7 @@ from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.ground_truth.targets import STEP, ExtraTargets, PixelSurfaces, find_surfaces, reflective
 from datagen.recipe.recipe import read_recipe, recipe_to_text
+from datagen.rendering.card import CARD
 from datagen.verify.dataset_check import verify_dataset
 from scenes import FAMILIES, Scene
 from scenes.motion.trajectories import quaternion
@@ -393,6 +394,7 @@ def keep_targets(root: Path, kinds: tuple[str, ...]) -> None:
     layout = Layout(root)
     recipe = replace(read_recipe(layout.recipe), targets=kinds)
     layout.recipe.write_text(recipe_to_text(recipe), encoding="utf-8")
+    (root / CARD).unlink()  # it is of the set with all targets
     for kind in set(EXTRA_TARGETS) - set(kinds):
         shutil.rmtree(root / kind)
     path = layout.manifest("train", 0)
