@@ -85,7 +85,18 @@ def _view(camera: StereoCamera, view: str, time: float) -> dict[str, Any]:
 
 
 def write_cameras(path: Path, record: dict[str, Any]) -> None:
-    """Write what `cameras_record` makes."""
+    """Write what `cameras_record` makes.
+
+    >>> import tempfile
+    >>> from scenes.spec import Trajectory
+    >>> camera = StereoCamera(64, 32, 35.0, 0.2, Trajectory.static((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "cameras.json"
+    ...     write_cameras(path, cameras_record(camera, {"0006": 5.0}))
+    ...     read = read_cameras(path)
+    >>> list(read["frames"]), read["baseline_m"]
+    (['0006'], 0.2)
+    """
     write_text(path, json.dumps(record) + "\n")
 
 

@@ -70,7 +70,7 @@ def read_evaluation(folder: Path) -> EvaluatedSet:
         reason = (
             "; ".join(cattrs.transform_error(error))
             if isinstance(error, cattrs.BaseValidationError)
-            else error
+            else getattr(error, "strerror", None) or error
         )
         raise InputError(f"{path}: is not a whole evaluation ({reason})") from error
     return evaluated

@@ -168,8 +168,6 @@ class Refine:
             raise UsageError("--disparity and --predictor sgbm both give the disparity; choose one")
         if self.disparity_right is not None and self.disparity is None:
             raise UsageError("--disparity-right goes with --disparity")
-        if self.out.exists() and not self.out.is_dir():
-            raise UsageError(f"--out {self.out}: is a file, not a folder")
         for flag, read in (("LEFT", self.left), ("RIGHT", self.right)):
             if read.is_dir():
                 keep_apart("--out", self.out, flag, read)

@@ -9,6 +9,7 @@ from typing import Any
 
 from stereoforge.errors import CommandError
 from stereoforge_kit.files import write_text
+from stereoforge_kit.messages import listed
 
 SETTINGS = "settings.json"
 """Name of the file with all that decides the results."""
@@ -38,5 +39,5 @@ def claim_results(folder: Path, settings: Mapping[str, Any], flag: str) -> None:
         raise CommandError(f"{noted}: cannot be read, so nothing can be continued there ({error})") from error
     if different:
         raise CommandError(
-            f"{flag} {folder}: holds results of other settings ({', '.join(different)}); choose another folder"
+            f"{flag} {folder}: holds results of other settings ({listed(different)}); choose another folder"
         )

@@ -134,7 +134,7 @@ def test_contradictions_and_mistakes_are_sentences(world, tmp_path, capsys):
     for code, more, reason in (
         (2, (*given, "--predictor", "sgbm"), "choose one"),
         (2, ("--disparity-right", folder / "given.pfm"), "goes with --disparity"),
-        (1, ("--disparity", folder / "left.png"), "left.png: a KITTI disparity is a 16-bit grey PNG"),
+        (1, ("--disparity", folder / "left.png"), "left.png: a disparity is a 16-bit grey PNG"),
         (1, (*given, "--weights", tmp_path / "gone"), "no such run folder"),
         (1, (*given, "--weights", folder / "given.pfm"), "is a file, not a run folder"),
         (1, (*given, "--parameters", tmp_path / "gone.json"), "gone.json: cannot be read"),
