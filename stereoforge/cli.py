@@ -53,10 +53,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:
         sys.exit(_say(f"interrupted; {after_interruption(command)}", 130))
     except Exception as error:
+        if _was_interrupted(error):
+            sys.exit(_say(f"interrupted; {after_interruption(command)}", 130))
         if debug:
             raise
         sys.exit(_say(*_explain(error)))
     sys.exit(0)
+
+
+def _was_interrupted(error: Exception) -> bool:
+    """Whether it is what numba makes of an interruption that arrives within a compiled function."""
+    return isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt)
 
 
 def _leave_current_folder() -> None:

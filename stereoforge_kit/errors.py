@@ -20,7 +20,11 @@ class UserError(Exception):
 
     exit_code: ClassVar[int] = 1
 
+    whole: str
+    """The message with its middle."""
+
     def __init__(self, message: str = "") -> None:
+        self.whole = message
         super().__init__(message if len(message) <= LONGEST_MESSAGE else shortened(message, LONGEST_MESSAGE))
 
 

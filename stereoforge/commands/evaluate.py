@@ -15,7 +15,6 @@ from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import check_max_disparity, parse_methods, several, shown
 from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console, remark
-from stereoforge_kit.messages import listed
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,9 @@ class Evaluate:
         lacking = untrained(rows, run, self.predictor)
         notes = untrained_notes(lacking, run, self.predictor)
         if len(lacking) == len(rows):
-            raise CommandError(listed(notes, most=2, longest=130, separator="; "))
+            for note in notes[:-1]:
+                remark(note)
+            raise CommandError(notes[-1])
         sets = [
             evaluate_set(
                 each,

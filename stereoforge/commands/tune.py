@@ -75,10 +75,9 @@ class Tune:
         lacking = untrained(asked, self.weights, self.predictor)
         notes = untrained_notes(lacking, self.weights, self.predictor)
         if len(lacking) == len(asked):
-            raise CommandError(
-                listed(notes, most=2, longest=130, separator="; ")
-                or f"{listed(methods)}: there is nothing to tune"
-            )
+            for note in notes[:-1]:
+                remark(note)
+            raise CommandError(notes[-1] if notes else f"{listed(methods)}: there is nothing to tune")
         frames = validation_frames(sources, predictors, self.frames)
         out = parameters_file(self.weights, self.predictor) if self.out is None else self.out
         about = describe(frames, self.data, self.objective, network_digests(self.weights, self.predictor))

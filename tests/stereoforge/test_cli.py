@@ -415,6 +415,19 @@ def test_sigterm_ends_every_command_with_how_to_go_on(
     assert signal.getsignal(signal.SIGTERM) == before
 
 
+def test_an_interruption_within_a_compiled_function_is_one_too(
+    refused: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Numba turns it into a SystemError."""
+
+    def compiled(*_: object, **__: object) -> None:
+        raise SystemError("CPUDispatcher returned a result with an exception set") from KeyboardInterrupt()
+
+    module, _, name = INTERRUPTED[0][1].rpartition(".")
+    monkeypatch.setattr(import_module(module), name, compiled)
+    assert refused(130, *INTERRUPTED[0][0]).startswith("stereoforge: interrupted; ")
+
+
 def test_an_interrupted_training_names_the_step_it_goes_on_from(
     tmp_path: Path, refused: Callable[..., str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

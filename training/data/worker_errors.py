@@ -29,7 +29,7 @@ def plain_worker_errors() -> Iterator[None]:
     try:
         yield
     except UserError as error:
-        if not _WRAPPED.match(str(error)):
+        if not _WRAPPED.match(error.whole):
             raise
         raise type(error)(_last_message(error)) from error
     except RuntimeError as error:
@@ -49,7 +49,7 @@ def plain_worker_errors() -> Iterator[None]:
         raise
 
 
-def _last_message(error: Exception) -> str:
+def _last_message(error: UserError) -> str:
     """The message at the end of the traceback that stands in an error's message."""
     kind = type(error)
-    return str(error).rpartition(f"{kind.__module__}.{kind.__qualname__}: ")[2].strip()
+    return error.whole.rpartition(f"{kind.__module__}.{kind.__qualname__}: ")[2].strip()
