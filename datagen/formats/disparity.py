@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
+import lzma
 import math
+import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -67,7 +70,9 @@ def read_disparity_npz(path: Path) -> Float32:
             if members[0].file_size > MAX_FILE_BYTES:
                 raise FormatError(f"{path}: {members[0].file_size} bytes are more than any disparity has")
             content = archive.read(members[0])
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError) as error:
+    except FormatError:
+        raise
+    except _NO_NPZ as error:
         raise FormatError(f"{path}: is no .npz file ({error})") from error
     return _disparity_of(path, _decode_npy(path, content))
 
@@ -83,6 +88,19 @@ DISPARITY_KINDS = "a .pfm, a 16-bit .png, a .npy or a .npz file"
 """What they are, for messages."""
 
 
+_NO_NPY = (ValueError, TypeError, EOFError, SyntaxError, KeyError, RecursionError, tokenize.TokenError)
+"""What numpy raises for damaged headers, which are Python literals."""
+_NO_NPZ = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    ValueError,
+    RuntimeError,
+    EOFError,
+    OSError,
+    lzma.LZMAError,
+)
+"""What zipfile raises for damaged archives."""
 _HEADERS: Mapping[tuple[int, int], Callable[[io.BytesIO], Any]] = {
     (1, 0): npy.read_array_header_1_0,
     (2, 0): npy.read_array_header_2_0,
@@ -105,7 +123,7 @@ def _decode_npy(path: Path, content: bytes) -> NDArray[Any]:
         return np.asarray(np.load(io.BytesIO(content), allow_pickle=False))
     except FormatError:
         raise
-    except (ValueError, TypeError, EOFError) as error:
+    except _NO_NPY as error:
         raise FormatError(f"{path}: is no .npy file ({' '.join(str(error).split())})") from error
 
 
