@@ -6,7 +6,7 @@ A new one is one module in this folder with a `Regressor` subclass; it is found 
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -53,7 +53,7 @@ class Objective:
         raise NotImplementedError
 
 
-class Regressor(nn.Module):
+class Regressor(nn.Module, ABC):
     """A network that predicts the left view's disparity."""
 
     name: ClassVar[str]

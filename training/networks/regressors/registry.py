@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
-import inspect
-import pkgutil
 from collections.abc import Mapping
 from functools import cache
 
 import training.networks.regressors
+from scenes.discovery import concrete_subclasses
 from training.errors import TrainingError
 from training.networks.regressors.interface import Regressor, RegressorConfig
 
@@ -21,16 +19,11 @@ def known_regressors() -> Mapping[str, type[Regressor]]:
         TrainingError: two modules define one of the same name.
     """
     regressors: dict[str, type[Regressor]] = {}
-    package = training.networks.regressors
-    for found in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
-        module = importlib.import_module(found.name)
-        for _, member in inspect.getmembers(module, inspect.isclass):
-            local = member.__module__ == found.name
-            if local and issubclass(member, Regressor) and member is not Regressor:
-                if member.name in regressors:
-                    other = regressors[member.name].__module__
-                    raise TrainingError(f"{found.name} and {other} both define a regressor {member.name!r}")
-                regressors[member.name] = member
+    for kind in concrete_subclasses(training.networks.regressors, Regressor).values():  # type: ignore[type-abstract]
+        if kind.name in regressors:
+            other = regressors[kind.name].__module__
+            raise TrainingError(f"{kind.__module__} and {other} both define a regressor {kind.name!r}")
+        regressors[kind.name] = kind
     return regressors
 
 
