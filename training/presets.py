@@ -84,7 +84,16 @@ class Preset(SamplingConfig):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RegressorPreset(Preset):
+class DisparityPreset(Preset):
+    """What every training of a regressor has."""
+
+    frozen: tuple[str, ...] = ()
+    """Parts of the network (`named_children`) that stay as they were in the run folder that the training starts from,
+    with the statistics of their BatchNorm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegressorPreset(DisparityPreset):
     """A regressor from scratch."""
 
     network: RegressorConfig
@@ -94,7 +103,7 @@ class RegressorPreset(Preset):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FineTuningPreset(Preset):
+class FineTuningPreset(DisparityPreset):
     """`regressor_f`: a trained regressor, fine-tuned with eq. 9.
 
     Its presets do not zoom, since eq. 9 takes differences of the ground truth, and a zoomed map of nearest pixels has
@@ -514,9 +523,16 @@ def _presets_of(network: str) -> Mapping[str, Preset]:
 def change_preset(preset: Preset, changes: Mapping[str, Any]) -> Preset:
     """Change some fields of a preset.
 
+    Args:
+        preset: The preset.
+        changes: New values by the names of fields; `learning_rate` is the optimizer's.
+
     Raises:
         TrainingError: a field that the preset does not have, or a crop size that does not suit the network.
     """
+    changes = dict(changes)
+    if "learning_rate" in changes:
+        changes["optimizer"] = replace(preset.optimizer, learning_rate=changes.pop("learning_rate"))
     known = [field.name for field in fields(preset)]
     for name in changes:
         if name not in known:

@@ -56,6 +56,13 @@ class Train:
     """Data sets that decide which weights are kept."""
     crop: Annotated[str | None, shown("WxH", "the preset's")] = None
     """Size of the training crops, multiples of 64 (for costvolume, of 16); KITTI's frames need 320 rows or fewer."""
+    batch_size: Annotated[int | None, shown("N", "the preset's, 4")] = None
+    """Crops in an optimizer step."""
+    learning_rate: Annotated[float | None, shown("RATE", "the preset's")] = None
+    """The largest learning rate, after the warm-up."""
+    freeze: Annotated[str | None, shown("PARTS", "none")] = None
+    """regressor with --init, regressor_f: parts of the network that stay as they are, comma-separated; of costvolume
+    these are descriptors, aggregation, half_weights and look."""
     correct_within: Annotated[float | None, shown("PX", "the preset's, 1")] = None
     """confnet: a disparity this close to the ground truth counts as correct (KITTI: 3)."""
     ema: Annotated[float | None, shown("DECAY", "none")] = None
@@ -106,6 +113,7 @@ class Train:
             ("steps", self.steps, 1),
             ("seed", self.seed, 0),
             ("workers", self.workers, 0),
+            ("batch-size", self.batch_size, 1),
         ):
             if value is not None and value < least:
                 raise UsageError(f"--{name} must be at least {least}, got {value}")
@@ -173,6 +181,9 @@ class Train:
             "resume",
             "validation",
             "crop",
+            "batch_size",
+            "learning_rate",
+            "freeze",
             "correct_within",
             "ema",
             "curriculum",
@@ -198,6 +209,16 @@ class Train:
         changes: dict[str, Any] = {}
         if self.crop is not None:
             changes["crop_width"], changes["crop_height"] = parse_size(self.crop, "crop")
+        if self.batch_size is not None:
+            changes["batch_size"] = self.batch_size
+        if self.learning_rate is not None:
+            if not 0 < self.learning_rate < float("inf"):
+                raise UsageError(f"--learning-rate must be positive, got {self.learning_rate}")
+            changes["learning_rate"] = self.learning_rate
+        if self.freeze is not None:
+            if self.task not in ("regressor", "regressor_f"):
+                raise UsageError(f"--freeze is for regressor and regressor_f, not for {self.task}")
+            changes["frozen"] = tuple(name.strip() for name in self.freeze.split(","))
         if self.correct_within is not None:
             if not 0 < self.correct_within < float("inf"):
                 raise UsageError(f"--correct-within must be positive, got {self.correct_within}")

@@ -165,6 +165,10 @@ def _require_regressor(request: TrainingRequest, preset: Preset) -> None:
     if isinstance(preset, RegressorFreeConfNetPreset | RegressorFreeGradNetPreset):
         return
     if isinstance(preset, RegressorPreset) and init is None:
+        if preset.frozen:
+            raise TrainingError(
+                "frozen parts keep the weights of another run: name its folder as init (--init)"
+            )
         return
     folder = out if init is None else init
     if not has_weights(folder, "regressor"):

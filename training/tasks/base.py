@@ -116,7 +116,7 @@ class StereoTask(pl.LightningModule):
         entropy = np.random.SeedSequence([self.seed, 3, self.global_step, self.global_rank])
         torch.manual_seed(int(entropy.generate_state(1, np.uint64)[0]))
         fixed_from = self.steps - round(self.preset.fixed_statistics * self.steps)
-        norms = [part for part in self.network.modules() if isinstance(part, _BatchNorm)]
+        norms = [part for part in self.network.modules() if isinstance(part, _BatchNorm) and part.training]
         if (
             norms and self.global_step == fixed_from > 0
         ):  # from 0, the statistics that came with the network stay
