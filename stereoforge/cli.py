@@ -28,6 +28,7 @@ DESCRIPTION = (
 MISSING_PARTS = {
     "bpy": "rendering needs Blender: pip install 'stereoforge[render]' on Python 3.11 (bpy 4.5) or 3.13 (bpy 5.2)",
     "torch": "networks need PyTorch: pip install torch, then pip install 'stereoforge[train]'",
+    "av": "reading and writing videos needs PyAV: pip install 'stereoforge[video]'",
     "onnxruntime": "ONNX needs its runtime: pip install 'stereoforge[onnx]'",
     "ray": "--executor ray needs Ray: pip install 'stereoforge[ray]'",
     "fsspec": "data sets behind URLs need fsspec: pip install 'stereoforge[cloud]'",

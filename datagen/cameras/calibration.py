@@ -49,24 +49,40 @@ class Calibration:
 
         Raises ValueError for a size of another shape, and for none at all.
         """
-        own = self.size or size
-        if own is None:
+        wanted = size or self.size
+        if wanted is None:
             raise InputError("the file does not say how large the images are, so --size has to")
-        width, height = size or own
-        if abs(width * own[1] / own[0] - height) >= OFF_BY_PX:
-            raise InputError(
-                f"images of {width}x{height} have another shape than the camera's {own[0]}x{own[1]}"
-            )
-        x, y = width / own[0], height / own[1]
+        fitted = self.scaled_to(wanted)
         return Rig(
-            width,
-            height,
+            *wanted,
+            fitted.fx,
+            fitted.fy,
+            fitted.cx_left + 0.5,
+            fitted.cx_right + 0.5,
+            fitted.cy + 0.5,
+            self.baseline_m,
+        )
+
+    def scaled_to(self, size: tuple[int, int]) -> Calibration:
+        """The calibration of images that were scaled to (width, height); those of unknown size are taken as they are.
+
+        Raises ValueError for a size of another shape.
+        """
+        width, height = size
+        own_width, own_height = self.size or size
+        if abs(width * own_height / own_width - height) >= OFF_BY_PX:
+            raise InputError(
+                f"images of {width}x{height} have another shape than the camera's {own_width}x{own_height}"
+            )
+        x, y = width / own_width, height / own_height
+        return Calibration(
             self.fx * x,
             self.fy * y,
-            (self.cx_left + 0.5) * x,
-            (self.cx_right + 0.5) * x,
-            (self.cy + 0.5) * y,
+            (self.cx_left + 0.5) * x - 0.5,
+            (self.cx_right + 0.5) * x - 0.5,
+            (self.cy + 0.5) * y - 0.5,
             self.baseline_m,
+            size,
         )
 
 

@@ -17,13 +17,10 @@ from numpy.typing import NDArray
 
 from datagen.dataset.layout import VIEWS, View
 from datagen.dataset.samples import StereoDataset, StereoSample
-from datagen.formats import write_png
+from datagen.formats.depth_png import FARTHEST_M, write_depth_png
 from stereoforge_kit.files import Tree
 
 DepthFile = Literal["png", "npy"]
-MILLIMETRES = 1000
-MOST_MM = np.iinfo(np.uint16).max
-"""65.535 m."""
 
 
 def export_depth(
@@ -51,17 +48,16 @@ def export_depth(
                 name = sample.layout.relative(path.with_suffix(f".{kind}"))
                 with out.writing(name) as target:
                     if kind == "png":
-                        write_png(target, millimetres(depth))
+                        too_far += write_depth_png(target, depth) / 2
                     else:
                         with target.open("wb") as file:
                             np.save(file, depth)
-                too_far += float((np.isfinite(depth) & (depth * MILLIMETRES >= MOST_MM + 0.5)).mean()) / 2
             done += 1
             progress(done, total)
     if kind == "npy" or not too_far:
         return []
     return [
-        f"16 bits hold no depth beyond {MOST_MM / MILLIMETRES:g} m: {too_far / total:.2%} of the pixels became 0, as "
+        f"16 bits hold no depth beyond {FARTHEST_M:g} m: {too_far / total:.2%} of the pixels became 0, as "
         "the sky"
     ]
 
@@ -72,13 +68,3 @@ def depth_of(sample: StereoSample, view: View) -> NDArray[np.float32]:
         return sample.depth(view)
     disparity: NDArray[np.float32] = getattr(sample, f"disparity_{view}")
     return sample.scene_record.camera.depth(disparity).astype(np.float32)
-
-
-def millimetres(depth: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """(H, W) whole millimetres of a depth (H, W) in metres, 0 where 16 bits cannot hold it.
-
-    >>> millimetres(np.float32([[1.2344, 65.535, 65.536, np.inf]])).tolist()
-    [[1234, 65535, 0, 0]]
-    """
-    rounded = np.rint(depth.astype(np.float64) * MILLIMETRES)
-    return np.where(rounded <= MOST_MM, rounded, 0).astype(np.uint16)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import tyro
@@ -13,24 +13,21 @@ from numpy.typing import NDArray
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
 from stereoforge.inputs.flag_values import check_max_disparity, shown
-from stereoforge.inputs.images import pair_doubts, read_color_images
-from stereoforge.inputs.picture_pairs import PicturePair, find_pairs
+from stereoforge.inputs.images import pair_doubts
 from stereoforge.inputs.results_folder import claim_results
+from stereoforge.inputs.rig_flags import KnownRig, known_rig
+from stereoforge.inputs.stereo_pairs import StereoPair, StereoPairs, open_pairs
+from stereoforge.inputs.videos import VideoPairs
 from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console, progress_bar, remark
 
 if TYPE_CHECKING:
-    from stereoforge.pipelines.refiner import RefinedPair, StereoRefiner
+    from stereoforge.pipelines.refiner import StereoRefiner
 
-WRITTEN = (
-    "disparity.pfm",
-    "disparity_initial.pfm",
-    "confidence.pfm",
-    "deviation.pfm",
-    "gradient.exr",
-    "overview.png",
-)
-"""What is written into --out."""
+SIDE_BY_SIDE = "side_by_side.mp4"
+"""The video in --out."""
+PICTURES_PER_SECOND = 10.0
+"""Speed of the video of a folder of pictures."""
 POSTERIOR_SAMPLES = 32
 """For --deviation: each pixel's deviation is off by an eighth of itself."""
 
@@ -51,16 +48,16 @@ class Refine:
 
     With --disparity or --predictor sgbm the disparity comes from another predictor; the run folder's confnet_free and
     gradnet_free judge it, or, without them, consistency and texture. Writes disparity.pfm, disparity_initial.pfm,
-    confidence.pfm, gradient.exr and overview.png; of two folders, into a folder for each pair. Run it again to continue
-    where it stopped.
+    confidence.pfm, gradient.exr and overview.png; of two folders or videos, into a folder for each pair. Run it again
+    to continue where it stopped.
     """
 
     interrupted: ClassVar[str] = "the same command run again continues where it stopped"
 
     left: Annotated[tyro.conf.Positional[Path], shown("LEFT")]
-    """Left picture (PNG, JPEG, TIFF, ...), or a folder of them."""
+    """Left picture (PNG, JPEG, TIFF, ...), a folder of them, or a video."""
     right: Annotated[tyro.conf.Positional[Path], shown("RIGHT")]
-    """Right picture, rectified and of the same size, or the folder of the right pictures."""
+    """Right picture, rectified and of the same size, the folder of the right pictures, or the right video."""
     out: Annotated[Path, shown("DIR")]
     """Folder for the results."""
     weights: Annotated[Path, shown("RUN", "the bundled weights")] = BUNDLED_WEIGHTS
@@ -84,15 +81,32 @@ class Refine:
     deviation: bool = False
     """Also write deviation.pfm, the refined disparity's standard deviation in pixels under the MRF's own Gaussian (of
     the exact form): its order, least sure last, is what it is good for. Takes 32 more solves."""
+    calibration: Annotated[Path | None, shown("FILE", "none")] = None
+    """Calibration of the rig, by OpenCV, Middlebury, KITTI, ROS (LEFT.yaml,RIGHT.yaml) or as JSON: also write the depth
+    in metres (depth.exr, depth.npy, depth.png in millimetres) and the coloured points (points.ply)."""
+    focal_px: Annotated[float | None, shown("PX", "none")] = None
+    """Instead of --calibration: focal length in pixels, with --baseline-m; the principal point is the middle."""
+    baseline_m: Annotated[float | None, shown("M", "none")] = None
+    """Distance of the two cameras in metres."""
+    doffs: Annotated[float, shown("PX")] = 0.0
+    """How much farther right the principal point is in the right view than in the left one."""
+    min_confidence: Annotated[float, shown("C")] = 0.3
+    """Pixels of a lower confidence are left out of points.ply, as are those at the edges of things."""
+    video: bool = False
+    """Of two folders or videos: also write side_by_side.mp4, the left views beside their disparities."""
     device: Annotated[str, shown("NAME")] = "auto"
     """What the networks run on: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
 
     def run(self) -> None:
         """Refine every pair and write its results."""
         self._check()
-        found = find_pairs(self.left, self.right)
-        if len(found.pairs) > 1 and self.disparity is not None:
+        rig = known_rig(self.calibration, self.focal_px, self.baseline_m, self.doffs)
+        pairs = open_pairs(self.left, self.right)
+        single = self.left.is_file() and not isinstance(pairs, VideoPairs)
+        if not single and self.disparity is not None:
             raise UsageError("--disparity is of one pair; give two pictures")
+        if single and self.video:
+            raise UsageError("--video is for folders and videos; one pair has overview.png")
         from stereoforge.pipelines.refiner import StereoRefiner
 
         refiner = StereoRefiner(
@@ -103,38 +117,58 @@ class Refine:
             max_disparity=self.max_disparity,
             device=self.device,
         )
-        for note in (found.note, *refiner.notes):
+        for note in (pairs.note, *refiner.notes):
             if note:
                 remark(note)
-        if not found.pairs[0].name:
-            with console.status("refining; the first time after an install this compiles for a minute"):
-                said = self._refine(refiner, found.pairs[0])
-            for line in said[:-1]:
-                remark(line)
-            console.print(said[-1], markup=False)
+        if not single:
+            self._refine_all(refiner, pairs, rig)
             return
-        self._refine_all(refiner, found.pairs)
+        with console.status("refining; the first time after an install this compiles for a minute"):
+            said = self._refine(refiner, next(iter(pairs)), rig)
+        for line in said[:-1]:
+            remark(line)
+        console.print(said[-1], markup=False)
 
-    def _refine_all(self, refiner: StereoRefiner, pairs: tuple[PicturePair, ...]) -> None:
-        """Refine the pairs of two folders but for those that are there already."""
-        claim_results(self.out, {**refiner.settings, "deviation": self.deviation}, "--out")
-        left = [pair for pair in pairs if not (self.out / pair.name / WRITTEN[-1]).is_file()]
+    def _refine_all(self, refiner: StereoRefiner, pairs: StereoPairs, rig: KnownRig | None) -> None:
+        """Refine the pairs of two folders or videos but for those that are there already."""
+        from stereoforge.pipelines.refined_files import OVERVIEW
+        from stereoforge.pipelines.side_by_side import write_video
+
+        claim_results(self.out, self._settings(refiner, rig), "--out")
+        made = found = 0
         with progress_bar() as progress:
-            task = progress.add_task("refining", total=len(pairs), completed=len(pairs) - len(left))
-            for pair in left:
-                for line in self._refine(refiner, pair)[:-1]:
-                    remark(f"{pair.name}: {line}")
+            task = progress.add_task("refining", total=len(pairs))
+            for pair in pairs:
+                if (self.out / pair.name / OVERVIEW).is_file():
+                    found += 1
+                else:
+                    for line in self._refine(refiner, pair, rig)[:-1]:
+                        remark(f"{pair.name}: {line}")
+                    made += 1
                 progress.advance(task)
-        console.print(
-            f"{self.out}: {len(left)} pairs refined, {len(pairs) - len(left)} were there already",
-            markup=False,
-        )
+            if self.video:
+                task = progress.add_task(f"writing {SIDE_BY_SIDE}", total=made + found)
+                speed = pairs.frames_per_second if isinstance(pairs, VideoPairs) else PICTURES_PER_SECOND
+                write_video(self.out / SIDE_BY_SIDE, pairs, self.out, speed, lambda: progress.advance(task))
+        console.print(f"{self.out}: {made} pairs refined, {found} were there already", markup=False)
 
-    def _refine(self, refiner: StereoRefiner, pair: PicturePair) -> list[str]:
+    def _settings(self, refiner: StereoRefiner, rig: KnownRig | None) -> dict[str, Any]:
+        """All that decides the results of a folder, as JSON values."""
+        return {
+            **refiner.settings,
+            "left": str(self.left.resolve()),
+            "right": str(self.right.resolve()),
+            "deviation": self.deviation,
+            "rig": None if rig is None else rig.as_json(),
+            "min_confidence": self.min_confidence,
+        }
+
+    def _refine(self, refiner: StereoRefiner, pair: StereoPair, rig: KnownRig | None) -> list[str]:
         """Refine one pair, write its results, and return what is to be said of it, the result last."""
-        left, right, remarks = read_color_images(pair.left, pair.right)
+        left, right, remarks = pair.read()
         remarks += (odd := pair_doubts(left, right))
         from stereoforge.inputs.disparity_files import read_disparity
+        from stereoforge.pipelines.refined_files import OVERVIEW, write_refined
 
         size = (left.shape[0], left.shape[1])
         given: list[NDArray[np.float32] | None] = []
@@ -150,7 +184,11 @@ class Refine:
             deviation_samples=POSTERIOR_SAMPLES if self.deviation else 0,
         )
         out = self.out / pair.name
-        self._write(out, left, refined)
+        calibration = None
+        if rig is not None:
+            calibration, said = rig.calibration((size[1], size[0]))
+            remarks += said
+        remarks += write_refined(out, left, refined, calibration, self.min_confidence)
         doubts = [] if odd else _doubtful_views(left, right)
         doubts += _doubts(given[0], refined.confidence)
         disparity = refined.disparity
@@ -159,7 +197,7 @@ class Refine:
             *doubts,
             *_doubtful_result(disparity),
             f"{out}: disparity {disparity.min():.1f} to {disparity.max():.1f} px, refined in "
-            f"{refined.info.seconds:.2f} s ({refined.info.solver}); look at {out / WRITTEN[-1]}",
+            f"{refined.info.seconds:.2f} s ({refined.info.solver}); look at {out / OVERVIEW}",
         ]
 
     def _check(self) -> None:
@@ -171,30 +209,17 @@ class Refine:
         for flag, read in (("LEFT", self.left), ("RIGHT", self.right)):
             if read.is_dir():
                 keep_apart("--out", self.out, flag, read)
-        for name in WRITTEN:
+        if not 0 <= self.min_confidence <= 1:
+            raise UsageError(f"--min-confidence must lie between 0 and 1, got {self.min_confidence}")
+        from stereoforge.pipelines.refined_files import FILES
+
+        for name in (*FILES, SIDE_BY_SIDE):
             keep_apart("--out", self.out / name, "LEFT", self.left)
             keep_apart("--out", self.out / name, "RIGHT", self.right)
             keep_apart("--out", self.out / name, "--disparity", self.disparity)
             keep_apart("--out", self.out / name, "--disparity-right", self.disparity_right)
+            keep_apart("--out", self.out / name, "--calibration", self.calibration)
         check_writable("--out", self.out)
-
-    def _write(self, out: Path, left: NDArray[np.uint8], refined: RefinedPair) -> None:
-        from datagen.formats import write_gradient, write_pfm, write_png
-        from datagen.ground_truth.labels import gradient_validity
-        from refine.report.overview import overview_picture
-
-        # A slope is predicted everywhere; only the differences inside the image exist.
-        inside = gradient_validity(refined.gradient, float("inf"))
-        write_pfm(out / "disparity.pfm", refined.disparity)
-        write_pfm(out / "disparity_initial.pfm", refined.initial)
-        write_pfm(out / "confidence.pfm", refined.confidence)
-        if refined.deviation is not None:
-            write_pfm(out / "deviation.pfm", refined.deviation)
-        write_gradient(out / "gradient.exr", refined.gradient, inside)
-        picture = overview_picture(
-            left, refined.initial, refined.confidence, refined.disparity, refined.deviation
-        )
-        write_png(out / WRITTEN[-1], picture)
 
 
 def _doubts(given: NDArray[np.float32] | None, confidence: NDArray[np.float32]) -> list[str]:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from stereoforge.errors import UsageError
+from stereoforge.inputs.images import read_color_images
 
 PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".ppm", ".pgm")
 """Endings of the pictures in a folder."""
@@ -20,6 +25,10 @@ class PicturePair:
     left: Path
     right: Path
 
+    def read(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8], list[str]]:
+        """Both views as `read_color_images` gives them, and remarks about them."""
+        return read_color_images(self.left, self.right)
+
 
 @dataclass(frozen=True)
 class PicturePairs:
@@ -28,6 +37,14 @@ class PicturePairs:
     pairs: tuple[PicturePair, ...]
     note: str | None = None
     """What the user should know of how pictures were matched to one another."""
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.pairs)
+
+    def __iter__(self) -> Iterator[PicturePair]:
+        """One after the other."""
+        return iter(self.pairs)
 
 
 def find_pairs(left: Path, right: Path) -> PicturePairs:

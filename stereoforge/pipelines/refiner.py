@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.cameras.calibration import Calibration
+from datagen.cameras.reprojection import depth_of_disparity
 from refine.energy.system import Form
 from refine.methods.ours import Ours
 from refine.mrf.solve import SolveInfo
@@ -55,15 +56,14 @@ class RefinedPair:
         """Depth (H, W) in metres along the optical axis; infinite where the disparity is that of infinity or beyond.
 
         Args:
-            calibration: Of the pair, whose images had this size.
+            calibration: Of the pair.
+
+        Raises ValueError for a calibration of images of another size.
 
         Examples:
             A rig of 500 px and 0.1 m sees a point with a disparity of 10 px at 5 m.
         """
-        parallax = self.disparity.astype(np.float64) + calibration.doffs
-        with np.errstate(divide="ignore"):
-            depth = calibration.fx * calibration.baseline_m / np.maximum(parallax, 0.0)
-        return np.asarray(depth)
+        return depth_of_disparity(self.disparity, calibration)
 
 
 class StereoRefiner:
