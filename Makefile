@@ -68,6 +68,8 @@ $(BLENDER_5_2)/.installed: pyproject.toml constraints-blender-5.2.txt
 
 .venv/.installed-dev: .venv/.installed
 	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable '.[all,dev]'
+	@# Its other networks need packages that need a GPU; the tests train its GwcNet alone.
+	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --no-deps stereo-toolbox
 	@touch $@
 
 .venv/.installed-docs: .venv/.installed
