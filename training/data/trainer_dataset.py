@@ -109,5 +109,5 @@ class TrainerDataset(Dataset[dict[str, Tensor]]):
     def _image(self, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
         image = picture.astype(np.float32) / 255
         if self.normalized:
-            image = (image - np.float32(IMAGENET_MEAN)) / np.float32(IMAGENET_DEVIATION)
+            image = (image - np.array(IMAGENET_MEAN, np.float32)) / np.array(IMAGENET_DEVIATION, np.float32)
         return np.asarray(image.transpose(2, 0, 1))
