@@ -44,6 +44,11 @@ class Evaluate:
     """The methods' parameters, as `stereoforge tune` writes them."""
     bad_threshold: Annotated[float | None, shown("PX", "1, for KITTI 3")] = None
     """A disparity further off than this is bad, in pixels."""
+    protocol: Annotated[Literal["pooled", "generalization"], shown("pooled|generalization")] = "pooled"
+    """pooled: every pixel of a set counts alike. generalization: also the field's table of networks on sets that they
+    were not trained on, generalization.csv: mean error, and outliers in occluded, visible and all pixels, over 3 px
+    (KITTI and others), 2 px (Middlebury) or 1 px (ETH3D), each the mean of the frames' own, with ground truth from 0
+    to 191 px."""
     seed: Annotated[int, shown("N")] = 0
     """Of the confidence intervals, which draw scenes with replacement."""
     posterior: Annotated[int, shown("N")] = 0
@@ -63,6 +68,8 @@ class Evaluate:
         run = named_weights(self.weights)
         if not self.data:
             raise UsageError("evaluate needs at least one data set")
+        if self.protocol == "generalization" and self.bad_threshold is not None:
+            raise UsageError("--protocol generalization has thresholds of its own; leave out --bad-threshold")
         if self.bad_threshold is not None and not self.bad_threshold > 0:
             raise UsageError(f"--bad-threshold must be positive, got {self.bad_threshold}")
         check_max_disparity(self.max_disparity)
@@ -77,6 +84,12 @@ class Evaluate:
         check_writable("--out", self.out)
         if self.submission is not None:
             check_writable("--submission", self.submission)
+        from stereoforge.pipelines.generalization import (
+            counted_truth,
+            generalization_rows,
+            outlier_px,
+            write_generalization,
+        )
         from stereoforge.pipelines.prediction import (
             fallback_notes,
             open_predictors,
@@ -94,6 +107,7 @@ class Evaluate:
         from stereoforge.pipelines.submission import find_submission, write_submission
         from training.devices import parse_device
 
+        by_field = self.protocol == "generalization"
         parse_device(self.device)
         data = open_test_data(self.data, self.split, skip_broken=self.skip_broken)
         submission = find_submission(self.data) if self.submission else None
@@ -111,8 +125,11 @@ class Evaluate:
                 each,
                 predictors,
                 rows,
-                evaluation_options(each.family, self.bad_threshold, self.posterior),
+                evaluation_options(
+                    each.family, outlier_px(each.family) if by_field else self.bad_threshold, self.posterior
+                ),
                 skip_broken=self.skip_broken,
+                prepare=counted_truth if by_field else None,
             )
             for each in data
         ]
@@ -128,6 +145,14 @@ class Evaluate:
             remark(note)
         frames = ", ".join(f"{len(each.evaluation.frames)} of {each.name}" for each in sets)
         console.print(f"{files.html}: frames evaluated: {frames}")
+        if by_field:
+            for row in (row for each in sets for row in generalization_rows(each)):
+                console.print(
+                    f"{row.set}, {row.method}: {row.epe:.2f} px; outliers over {row.outlier_px:g} px: occluded "
+                    f"{row.occluded:.1f} %, visible {row.visible:.1f} %, all {row.all:.1f} %",
+                    markup=False,
+                )
+            console.print(str(write_generalization(sets, self.out)), markup=False)
         if self.submission and submission:
             count = write_submission(submission, predictors, settings.ours, self.submission)
             console.print(f"{self.submission}: {count} disparities")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -99,9 +99,11 @@ def evaluate_set(
     options: EvaluationOptions | None = None,
     *,
     skip_broken: bool = False,
+    prepare: Callable[[EvaluationFrame], EvaluationFrame] | None = None,
 ) -> EvaluatedSet:
     """Run the networks and every method on every frame, showing progress, and say what is wrong with the set.
 
+    `prepare` changes each frame before it is scored, such as the ground truth that counts.
     With `skip_broken`, frames that cannot be read are left out, and it is said which; otherwise DatasetError is raised
     at the first. It is raised too if none is left.
     """
@@ -109,8 +111,9 @@ def evaluate_set(
     with progress_bar() as progress:
         what = f"evaluating on {data.name}"
         task = progress.add_task(f"{what} (compiling, after an install)", total=len(data.frames))
+        predicted = _predicted(data.frames, predictors, doubts, skip_broken)
         evaluation = evaluate(
-            _predicted(data.frames, predictors, doubts, skip_broken),
+            predicted if prepare is None else map(prepare, predicted),
             methods,
             options or evaluation_options(data.family),
             progress=lambda done, _: progress.update(task, completed=done, description=what),
