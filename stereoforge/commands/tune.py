@@ -8,10 +8,12 @@ from typing import Annotated, ClassVar, Literal
 
 import tyro
 
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS, named_weights
 from stereoforge.errors import CommandError, UsageError
 from stereoforge.inputs.flag_values import parse_methods, several, shown
 from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console, remark
+from stereoforge_kit.files import is_within
 from stereoforge_kit.messages import listed
 
 
@@ -28,7 +30,7 @@ class Tune:
     data: Annotated[tyro.conf.Positional[tuple[str, ...]], several("DATA")]
     """Data sets, as for `evaluate`; their validation splits are used. One without splits needs #0-99 behind."""
     weights: Annotated[Path, shown("RUN")]
-    """Run folder of the networks."""
+    """Run folder of the networks. paper: the bundled networks of the paper, with --out."""
     out: Annotated[Path | None, shown("FILE", "parameters.json in the run folder")] = None
     """File for the parameters. One in the run folder is used by evaluate and refine without being named; those for
     --predictor sgbm are in parameters_sgbm.json there."""
@@ -49,6 +51,11 @@ class Tune:
             raise UsageError(f"--frames must be at least 1, got {self.frames}")
         if not self.data:
             raise UsageError("tune needs at least one data set")
+        run = named_weights(self.weights)
+        if self.out is None and is_within(run, BUNDLED_WEIGHTS):
+            raise UsageError(
+                "the bundled weights stay as they are: name a file for the parameters with --out"
+            )
         if self.out is not None:
             for source in self.data:
                 keep_apart("--out", self.out, "the data set", source)
@@ -70,17 +77,17 @@ class Tune:
 
         parse_device(self.device)
         sources = [open_source(text) for text in self.data]
-        predictors = open_predictors(self.weights, self.device, self.predictor)
+        predictors = open_predictors(run, self.device, self.predictor)
         asked = [method for method in default_methods(methods) if method.search]
-        lacking = untrained(asked, self.weights, self.predictor)
-        notes = untrained_notes(lacking, self.weights, self.predictor)
+        lacking = untrained(asked, run, self.predictor)
+        notes = untrained_notes(lacking, run, self.predictor)
         if len(lacking) == len(asked):
             for note in notes[:-1]:
                 remark(note)
             raise CommandError(notes[-1] if notes else f"{listed(methods)}: there is nothing to tune")
         frames = validation_frames(sources, predictors, self.frames)
-        out = parameters_file(self.weights, self.predictor) if self.out is None else self.out
-        about = describe(frames, self.data, self.objective, network_digests(self.weights, self.predictor))
+        out = parameters_file(run, self.predictor) if self.out is None else self.out
+        about = describe(frames, self.data, self.objective, network_digests(run, self.predictor))
         tuned = Tuning(frames, out, about, self.objective).run(methods)
         table = Table(
             "method", "default", "tuned", "parameters", title=f"{self.objective}, relative to the input"

@@ -25,6 +25,7 @@ from datagen.formats import read_pfm
 from refine.evaluation.settings import read_settings
 from refine.evaluation.tuning import measure
 from refine.registry import known_methods
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.cli import main
 from stereoforge.commands import COMMANDS, command_class, command_summary
 from stereoforge.errors import UsageError
@@ -173,11 +174,19 @@ def test_wrong_flags_exit_with_2(tmp_path: Path, refused: Callable[..., str]) ->
     assert not (tmp_path / "set").exists()
 
 
+def test_the_bundled_parameters_are_not_overwritten(refused: Callable[..., str]) -> None:
+    for weights in ("paper", str(BUNDLED_WEIGHTS)):
+        assert "name a file for the parameters with --out" in refused(2, "tune", "set", "--weights", weights)
+
+
 def test_wrong_training_flags_exit_with_2(tmp_path: Path, refused: Callable[..., str]) -> None:
     """Before any data is looked for."""
     command = ("train", "confnet", "--data", tmp_path / "none", "--out", tmp_path / "run")
     for flag, value, sentence in (
         ("--steps", "0", "--steps must be at least 1, got 0"),
+        ("--batch-size", "0", "--batch-size must be at least 1, got 0"),
+        ("--learning-rate", "nan", "--learning-rate must be positive, got nan"),
+        ("--freeze", "look", "--freeze is for regressor and regressor_f, not for confnet"),
         ("--curriculum", "1.5", "--curriculum must be a share from 0 to 1, got 1.5"),
         ("--curriculum", "nan", "--curriculum must be a share from 0 to 1, got nan"),
         ("--ema", "1", "--ema must lie between 0 and 1"),
