@@ -33,12 +33,11 @@ from scenes.spec import (
     SceneObject,
     Shape,
     SunLight,
-    Texture,
     Trajectory,
     World,
 )
 from scenes.textures.sky import Sky
-from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture
+from scenes.user_assets.pool import Asset, AssetPool, UserTexture
 from stereoforge_kit.errors import InputError
 
 _SHAPE_FILL = 1.8
@@ -195,7 +194,7 @@ def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -
         objects=scene.objects,
         materials=tuple(scene.materials),
         lights=_lights(rng, rig),
-        world=World(_environment(rng, config), uniform(rng, *config.sky_strength)),
+        world=_world(rng, config),
         exposure_key=uniform(rng, 0.18, 0.32),
         notes={"flying_objects": float(len(flyers)), "background_objects": float(len(background))},
         final=_final(rng, rig),
@@ -313,8 +312,8 @@ def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -
     for index in range(count):
         cover = min(each * math.exp(rng.normal(-0.1, 0.5)), 0.12)
         size_px = math.sqrt(cover * rig.camera.width * rig.camera.height / _SHAPE_FILL)
-        material = scene.material(_flyer_material(rng, rig.config, size_px))
-        flyers.append(_flyer(rng, rig, f"flying {index}", material, size_px, land.level_m))
+        material = _flyer_material(rng, rig.config, size_px)
+        flyers.append(_flyer(rng, rig, f"flying {index}", material, size_px, land.level_m, scene))
     return flyers
 
 
@@ -324,29 +323,48 @@ def _flyer_material(rng: np.random.Generator, config: FlyingThingsConfig, size_p
     return material if own is None else replace(material, color=UserTexture(own.sha256))
 
 
-def _environment(rng: np.random.Generator, config: FlyingThingsConfig) -> Texture:
+def _world(rng: np.random.Generator, config: FlyingThingsConfig) -> World:
     sky = Sky.sample(rng, 1024)
     own = config.draw_user_asset(rng, config.assets.environments)
-    return sky if own is None else UserEnvironment(own.sha256)
+    world = World(sky, uniform(rng, *config.sky_strength))
+    return world if own is None else config.assets.world(world, own)
 
 
 def _flyer(
-    rng: np.random.Generator, rig: _Rig, name: str, material: int, size_px: float, floor_m: float
+    rng: np.random.Generator,
+    rig: _Rig,
+    name: str,
+    material: Material,
+    size_px: float,
+    floor_m: float,
+    scene: Assembly,
 ) -> SceneObject:
-    """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth."""
+    """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth.
+
+    One of the user's that keeps its size is where that spans `size_px`, or as near to there as things in flight are.
+    """
     config = rig.config
+    materials: tuple[Material, ...] = (material,)
     shape = _sample_shape(
         rng, {name: share * (1 - config.complexity) for name, share in _PLAIN_SHAPES.items()}
     )
+    kept_m = None
     if own := config.draw_user_asset(rng, config.assets.meshes):
-        shape = UserMesh(own.sha256)
+        shape = mesh = config.assets.mesh(own)
+        materials = (mesh.materials() if mesh.own_materials else ()) or materials
+        kept_m = mesh.half_size() if config.assets.keep_size else None
     stretch = rng.uniform(0.8, 1.25, 3)
     near_share = config.disparity_share[1]
-    depth_m = rig.depth(uniform(rng, min(0.15 * near_share, near_share), near_share))
+    farthest_share = min(0.15 * near_share, near_share)
+    depth_m = rig.depth(uniform(rng, farthest_share, near_share))
     relative = size_px / rig.camera.focal_px
+    if kept_m is not None:
+        stretch = np.ones(3)
+        depth_m = float(np.clip(kept_m / relative, rig.nearest_m, rig.depth(farthest_share)))
+        relative = kept_m / depth_m
     # The front of a ball of radius relative * depth about the centre stays behind the nearest depth.
     depth_m = max(depth_m, rig.nearest_m / max(1 - _REACH * relative, 0.2))
-    size_m = relative * depth_m
+    size_m = relative * depth_m if kept_m is None else kept_m
     place = rig.point(uniform(rng, -0.95, 0.95), uniform(rng, -0.95, 0.95), depth_m)
     place[2] = max(place[2], floor_m + 0.7 * size_m)
     motion = wander(
@@ -361,7 +379,10 @@ def _flyer(
     )
     scale = size_m * stretch
     reach_m = float(np.linalg.norm(shape.mesh().vertices * scale, axis=1).max())
-    return SceneObject(name, shape, material, _kept_away(motion, reach_m, rig), vector(scale))
+    first, *more = (scene.material(one) for one in materials)
+    return SceneObject(
+        name, shape, first, _kept_away(motion, reach_m, rig), vector(scale), more_materials=tuple(more)
+    )
 
 
 def _kept_away(motion: Trajectory, reach_m: float, rig: _Rig) -> Trajectory:
