@@ -26,9 +26,6 @@ MAX_TRIANGLES = 300_000
 """Meshes of more are decimated (Garland and Heckbert, "Surface simplification using quadric error metrics", 1997)."""
 REMARK = "remark"
 """What a preparer returns beside the arrays where it changed something that the user should know."""
-DRACO = b"KHR_draco_mesh_compression"
-MAX_GLTF_HEADER_BYTES = 1 << 24
-"""Of a GLB file's beginning, which names the extensions that it needs."""
 
 
 def prepare_mesh(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import re
+import struct
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -348,9 +349,9 @@ def test_fine_meshes_are_decimated(tmp_path: Path) -> None:
 
 
 def test_draco_and_empty_files_are_called_by_their_name(tmp_path: Path) -> None:
-    (tmp_path / "a.glb").write_bytes(
-        b"glTF\2\0\0\0" + b'{"extensionsRequired": ["KHR_draco_mesh_compression"]}'
-    )
+    header = b'{"extensionsRequired": ["KHR_draco_mesh_compression"]}'
+    start = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(header), len(header), b"JSON")
+    (tmp_path / "a.glb").write_bytes(start + header)
     (tmp_path / "b.stl").write_bytes(b"")
     trimesh.creation.box().export(tmp_path / "c.stl")
     skipped = import_assets(tmp_path / "store", meshes=tmp_path).skipped
