@@ -37,6 +37,8 @@ def measured(sample: StereoSample) -> dict[str, float]:
     image = sample.left
     disparity = sample.disparity_left * (WIDTH / image.shape[1])
     plain = textureless(image)
+    # The first material of each object: of several, as users' meshes have them, only a target would tell which is seen.
+    worn = np.array([0, *(1 + thing.material for thing in sample.scene_record.objects)])
     near = disparity > np.median(disparity)
     low, middle, high = np.percentile(disparity, (1, 50, 99))
     shares = {
@@ -44,7 +46,7 @@ def measured(sample: StereoSample) -> dict[str, float]:
         "textureless, of the nearer half": plain[near].mean() if near.any() else plain.mean(),
         "clipped": (image == 255).any(axis=2).mean(),
         "black": (image == 0).any(axis=2).mean(),
-        "reflective": (reflective(sample.scene_record, sample.object_index_left) > 0).mean(),
+        "reflective": (reflective(sample.scene_record, worn[sample.object_index_left]) > 0).mean(),
     }
     pixels = {"disparity, 1 %": low, "disparity, median": middle, "disparity, 99 %": high}
     return {name: 100 * float(share) for name, share in shares.items()} | {

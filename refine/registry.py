@@ -5,16 +5,13 @@ A new one is one module in `refine/baselines/` with a `Method` subclass; it is f
 
 from __future__ import annotations
 
-import importlib
-import inspect
-import pkgutil
 from collections.abc import Mapping
 from functools import cache
-from itertools import chain
 
 import refine.baselines
 import refine.methods
 from refine.method import Method
+from stereoforge_kit.discovery import concrete_subclasses
 from stereoforge_kit.errors import InputError
 
 PAPER_FIRST = ("regressor", "regressor_f", "gradnet", "sgbm", "wmf", "color", "tgv", "fbs", "grad")
@@ -25,16 +22,12 @@ PAPER_LAST = ("ours_quadratic", "ours", "ours_conf_gt")
 def known_methods() -> Mapping[str, type[Method]]:
     """Every method there is, by name: the `Method` subclasses of the modules in the two packages."""
     methods: dict[str, type[Method]] = {}
-    packages = refine.methods, refine.baselines
-    for found in chain(*(pkgutil.iter_modules(p.__path__, f"{p.__name__}.") for p in packages)):
-        module = importlib.import_module(found.name)
-        for _, member in inspect.getmembers(module, inspect.isclass):
-            local = member.__module__ == found.name
-            if local and issubclass(member, Method) and not inspect.isabstract(member):
-                if member.name in methods:
-                    other = methods[member.name].__module__
-                    raise InputError(f"{found.name} and {other} both define a method {member.name!r}")
-                methods[member.name] = member
+    for package in (refine.methods, refine.baselines):
+        for kind in concrete_subclasses(package, Method).values():  # type: ignore[type-abstract]
+            if kind.name in methods:
+                other = methods[kind.name].__module__
+                raise InputError(f"{kind.__module__} and {other} both define a method {kind.name!r}")
+            methods[kind.name] = kind
     return methods
 
 

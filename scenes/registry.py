@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 import scenes.families
-from scenes.discovery import modules_in
 from scenes.family import Family, FamilyConfig
 from scenes.imperfections import with_imperfections
 from scenes.spec import Scene
 from scenes.user_assets.pool import AssetPool
 from scenes.user_assets.replacement import with_user_assets
+from stereoforge_kit.discovery import modules_in
 from stereoforge_kit.errors import InputError
 
 FAMILIES: dict[str, Family] = {module.FAMILY.name: module.FAMILY for module in modules_in(scenes.families)}

@@ -111,6 +111,9 @@ class Material:
     """Emitted radiance, multiplied by the base colour."""
     thin: bool = field(default=False, metadata=OMIT_DEFAULT)
     """A sheet that light passes straight through, its share being `transmission`: window panes."""
+    finish: Texture | None = field(default=None, metadata=OMIT_DEFAULT)
+    """A picture of numbers over the same texture coordinates, as in glTF: green is the roughness and blue the metallic
+    share. `roughness` and `metallic` are then what is usual on the surface."""
 
     @property
     def is_reflective(self) -> bool:
@@ -207,6 +210,13 @@ class SceneObject:
     """Half extents: the shape's cube [-1, 1]^3 becomes a box of twice this size."""
     deformation: Deformation | None = None
     """How the mesh deforms over time, before it is scaled and moved; None for a rigid object."""
+    more_materials: tuple[int, ...] = field(default=(), metadata=OMIT_DEFAULT)
+    """Those of the mesh's slots from 1 on, where it has several (`Mesh.slots`)."""
+
+    @property
+    def materials(self) -> tuple[int, ...]:
+        """Indices into `Scene.materials`, one for each slot of the mesh."""
+        return (self.material, *self.more_materials)
 
     def pose(self, time_frames: float) -> NDArray[np.float64]:
         """The (4, 4) matrix from mesh coordinates to the world, scale included."""
@@ -450,7 +460,8 @@ class Scene:
 
     def __post_init__(self) -> None:
         for thing in self.objects:
-            if not 0 <= thing.material < len(self.materials):
-                raise InputError(
-                    f"object {thing.name!r} has material {thing.material} of {len(self.materials)}"
-                )
+            for material in thing.materials:
+                if not 0 <= material < len(self.materials):
+                    raise InputError(
+                        f"object {thing.name!r} has material {material} of {len(self.materials)}"
+                    )

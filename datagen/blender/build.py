@@ -40,7 +40,7 @@ def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> Buil
     """
     scene = geometry.scene
     # Families sample some materials that no object has: painting those would be for nothing.
-    worn = sorted({thing.material for thing in scene.objects})
+    worn = sorted({material for thing in scene.objects for material in thing.materials})
     materials = {k: build_material(f"material_{k}", scene.materials[k]) for k in worn}
     objects = _build_objects(geometry, materials, blender_scene)
     for index, light in enumerate(scene.lights):
@@ -82,15 +82,17 @@ def _build_objects(
     geometry: SceneGeometry, materials: Mapping[int, bpy.types.Material], blender_scene: bpy.types.Scene
 ) -> tuple[bpy.types.Object, ...]:
     """One Blender object for each of the scene's. Rigid ones of the same shape and material share one mesh."""
-    shared: dict[tuple[int, int], bpy.types.Mesh] = {}
+    shared: dict[tuple[int, tuple[int, ...]], bpy.types.Mesh] = {}
     objects = []
     for index, thing in enumerate(geometry.scene.objects):
         data = geometry.meshes[index]
-        key = (id(data), thing.material)
+        key = (id(data), thing.materials)
         mesh = shared.get(key) if thing.deformation is None else None
         if mesh is None:
-            mesh = _build_mesh(thing.name, data, geometry.scene.materials[thing.material].repeats)
-            mesh.materials.append(materials[thing.material])
+            repeats = [geometry.scene.materials[material].repeats for material in thing.materials]
+            mesh = _build_mesh(thing.name, data, np.array(repeats, np.float32))
+            for material in thing.materials:
+                mesh.materials.append(materials[material])
             if thing.deformation is None:
                 shared[key] = mesh
         block = bpy.data.objects.new(thing.name, mesh)
@@ -102,7 +104,8 @@ def _build_objects(
     return tuple(objects)
 
 
-def _build_mesh(name: str, data: Mesh, repeats: float) -> bpy.types.Mesh:
+def _build_mesh(name: str, data: Mesh, repeats: NDArray[np.float32]) -> bpy.types.Mesh:
+    """A Blender mesh; `repeats` (S,) are `Material.repeats` of each slot's material."""
     mesh = bpy.data.meshes.new(name)
     count = len(data.triangles)
     mesh.vertices.add(len(data.vertices))
@@ -114,7 +117,10 @@ def _build_mesh(name: str, data: Mesh, repeats: float) -> bpy.types.Mesh:
     mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
     mesh.polygons.foreach_set("use_smooth", np.full(count, data.smooth))
     layer = mesh.uv_layers.new(name="uv")
-    layer.uv.foreach_set("vector", (data.corner_uv * np.float32(repeats)).astype(np.float32).ravel())
+    scale = repeats[0] if data.slots is None else repeats[data.slots][:, None, None]
+    layer.uv.foreach_set("vector", (data.corner_uv * scale).astype(np.float32).ravel())
+    if data.slots is not None:
+        mesh.polygons.foreach_set("material_index", data.slots.astype(np.int32))
     mesh.update(calc_edges=True)
     return mesh
 

@@ -8,12 +8,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.spec import Material
+from scenes.spec import Material, Texture
 
 
-def image_from_array(name: str, pixels: NDArray[np.uint8]) -> bpy.types.Image:
-    """A Blender image of sRGB pixels, (H, W, 3) uint8, row 0 at the top."""
-    image = bpy.data.images.new(name, pixels.shape[1], pixels.shape[0], alpha=False)
+def image_from_array(name: str, pixels: NDArray[np.uint8], is_data: bool = False) -> bpy.types.Image:
+    """A Blender image of (H, W, 3) uint8, row 0 at the top: sRGB colours, or numbers if it `is_data`."""
+    image = bpy.data.images.new(name, pixels.shape[1], pixels.shape[0], alpha=False, is_data=is_data)
     _set_pixels(image, pixels, 255.0)
     return image
 
@@ -45,12 +45,23 @@ def build_material(name: str, material: Material) -> bpy.types.Material:
     texture.image = image_from_array(name, material.color.image())
     surface = _surface_node(nodes, material)
     links.new(texture.outputs["Color"], surface.inputs[0])
+    if material.finish is not None and surface.type == "BSDF_PRINCIPLED":
+        _link_finish(block.node_tree, material.finish, surface)
     if material.emission > 0 and surface.type == "BSDF_PRINCIPLED":
         links.new(texture.outputs["Color"], surface.inputs["Emission Color"])
     output = nodes.new("ShaderNodeOutputMaterial")
     shader = _sheet(block.node_tree, material, surface.outputs[0]) if material.thin else surface.outputs[0]
     links.new(shader, output.inputs["Surface"])
     return block
+
+
+def _link_finish(tree: bpy.types.NodeTree, finish: Texture, surface: bpy.types.ShaderNode) -> None:
+    """Let a picture of numbers say how rough and how metallic a surface is."""
+    texture, split = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeSeparateColor")
+    texture.image = image_from_array("finish", finish.image(), is_data=True)
+    tree.links.new(texture.outputs["Color"], split.inputs[0])
+    tree.links.new(split.outputs["Green"], surface.inputs["Roughness"])
+    tree.links.new(split.outputs["Blue"], surface.inputs["Metallic"])
 
 
 def _sheet(
@@ -74,6 +85,7 @@ def _sheet(
 
 def _surface_node(nodes: bpy.types.Nodes, material: Material) -> bpy.types.ShaderNode:
     shiny = material.specular > 0 or material.metallic > 0 or material.transmission > 0
+    shiny = shiny or material.finish is not None
     shiny = shiny and not material.thin
     if not shiny and material.emission == 0:
         return nodes.new("ShaderNodeBsdfDiffuse")

@@ -9,7 +9,7 @@ from datagen.cameras.calibration import Calibration, CalibrationText, not_unders
 from datagen.cameras.reader import CalibrationReader
 from datagen.errors import FormatError
 from datagen.formats.limits import read_bounded
-from scenes.discovery import modules_in
+from stereoforge_kit.discovery import modules_in
 
 MAX_CALIBRATION_BYTES = 1 << 20
 """Largest calibration file that is read."""

@@ -35,6 +35,7 @@ _FORMATS = ("JPEG", "TIFF", "WEBP", "BMP", "GIF", "JPEG2000", "PPM")
 """Pillow's names of what is read beside PNG; none of them starts another program."""
 _FLOAT_MAPS = (b"PF", b"Pf")
 _TWELVE_BITS = 4095
+_PNG, _PNG_END = b"\x89PNG", b"IEND\xaeB`\x82"
 _TIFF = (b"II*\0", b"MM\0*")
 _WIDTH, _HEIGHT, _BITS_PER_SAMPLE = 256, 257, 258
 """Tags of TIFF."""
@@ -80,7 +81,23 @@ def read_picture(path: Path | str, longest_px: int | None = None) -> NDArray[np.
     >>> image.tolist()
     [[[7, 7, 7], [200, 200, 200]]]
     """
-    pixels = _decode(Path(path), longest_px)
+    return _color_of(_decode(Path(path), longest_px), longest_px)
+
+
+def decode_picture(data: bytes, name: str, longest_px: int | None = None) -> NDArray[np.uint8]:
+    """The colours of a picture that is part of another file, (H, W, 3) uint8, without regard to what is transparent.
+
+    Otherwise, and with the errors, as `read_picture`; `name` is for messages. Bytes that fill up a PNG picture's place
+    in the file do not matter.
+    """
+    if data.startswith(_PNG) and _PNG_END in data:
+        data = data[: data.rindex(_PNG_END) + len(_PNG_END)]
+    pixels = _decode(Path(name), longest_px, data)
+    opaque = pixels[..., :-1] if pixels.ndim == 3 and pixels.shape[2] in (2, 4) else pixels
+    return _color_of(opaque, longest_px)
+
+
+def _color_of(pixels: Pixels, longest_px: int | None) -> NDArray[np.uint8]:
     full = _full_scale(pixels)
     return _as_color(pixels, full) if longest_px is None else _reduced(pixels, full, longest_px)
 
@@ -115,8 +132,10 @@ def read_pnm(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
     16-bit numbers are big endian in these files (netpbm.sourceforge.net/doc/pgm.html). Raises FormatError for a
     file that is missing, damaged or neither.
     """
-    path = Path(path)
-    data = read_bounded(path)
+    return _decode_pnm(Path(path), read_bounded(Path(path)))
+
+
+def _decode_pnm(path: Path, data: bytes) -> Pixels:
     header = _PNM_HEADER.match(data)
     if header is None:
         raise FormatError(f"{path}: is not a binary PGM or PPM file, its header does not parse")
@@ -134,17 +153,20 @@ def read_pnm(path: Path | str) -> NDArray[np.uint8] | NDArray[np.uint16]:
     return values.astype(np.uint8) if kind.itemsize == 1 else values.astype(np.uint16)
 
 
-def _decode(path: Path, longest_px: int | None = None) -> Pixels:
-    """The numbers of any picture, upright: (H, W) grey or (H, W, C) grey with alpha, RGB, or RGB with alpha."""
-    data = read_bounded(path)
+def _decode(path: Path, longest_px: int | None = None, data: bytes | None = None) -> Pixels:
+    """The numbers of any picture, upright: (H, W) grey or (H, W, C) grey with alpha, RGB, or RGB with alpha.
+
+    data: The content, where it has been read already.
+    """
+    data = read_bounded(path) if data is None else data
     if data[:2] in _FLOAT_MAPS:
         raise PictureKindError(f"{path}: is a map of numbers, not a picture")
     most = MAX_ELEMENTS if longest_px is None else MAX_ELEMENTS_TO_REDUCE
-    if data.startswith(b"\x89PNG"):
+    if data.startswith(_PNG):
         pixels = decode_png(data, str(path), most)
         return _turned(pixels, _png_orientation(data, most)) if b"eXIf" in data else pixels
     if data[:2] in (b"P5", b"P6"):
-        return read_pnm(path)
+        return _decode_pnm(path, data)
     return _decode_with_pillow(path, data, longest_px, most)
 
 

@@ -29,6 +29,8 @@ class Hits:
     """(N,) pixels; that of infinity (`StereoCamera.disparity_at_infinity`) where nothing is hit."""
     object_index: NDArray[np.int64]
     """(N,) 0 where nothing is hit, else 1 + index in `Scene.objects`."""
+    material_index: NDArray[np.int64]
+    """(N,) 0 where nothing is hit, else 1 + index in `Scene.materials`."""
     occlusion: NDArray[np.uint8]
     """(N,) 0 visible, 1 occluded, 2 out of the other frame."""
 
@@ -61,11 +63,14 @@ class SceneRayCaster:
         Embree finds the triangle with 32-bit floats. The distance to its plane is then computed with 64 bits.
         """
         directions, camera = self.directions(view, rows, columns), self._scene.camera
-        inverse_depth, index = np.zeros(len(directions)), np.zeros(len(directions), np.int64)
+        inverse_depth = np.zeros(len(directions))
+        index, material = np.zeros((2, len(directions)), np.int64)
         if len(self.geometry.triangles):
             self._place(time_frames)
             own, other = self._camera_centres(view)
-            inverse_depth, index = self._first_hits(own, directions)
+            inverse_depth, hit = self._first_hits(own, directions)
+            index = np.where(hit >= 0, 1 + self.geometry.owners[hit], 0)
+            material = np.where(hit >= 0, 1 + self.geometry.materials[hit], 0)
         disparity = camera.disparity_metres * inverse_depth + camera.disparity_at_infinity
         x_other = columns + 0.5 + (-disparity if view == "left" else disparity)
         inside = (x_other >= 0) & (x_other <= camera.width)
@@ -73,7 +78,7 @@ class SceneRayCaster:
         if len(self.geometry.triangles):
             occluded = self._is_occluded(own, other, directions[inside], inverse_depth[inside])
             labels[inside] = np.where(occluded, OCCLUDED, VISIBLE)
-        return Hits(disparity, index, labels)
+        return Hits(disparity, index, material, labels)
 
     def coarse_pixels(self, across: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Rows and columns (N,) of a regular grid over the image, with about `across` pixels in a row."""
@@ -88,7 +93,10 @@ class SceneRayCaster:
         rows, columns = np.indices(shape).reshape(2, -1)
         hits = self.cast(view, time_frames, rows, columns)
         return Hits(
-            hits.disparity.reshape(shape), hits.object_index.reshape(shape), hits.occlusion.reshape(shape)
+            hits.disparity.reshape(shape),
+            hits.object_index.reshape(shape),
+            hits.material_index.reshape(shape),
+            hits.occlusion.reshape(shape),
         )
 
     def surface_points(
@@ -144,7 +152,7 @@ class SceneRayCaster:
     def _first_hits(
         self, origin: NDArray[np.float64], directions: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """1 / depth (N,) in 1/m, 0 where nothing is hit, and the object index (N,) of the first hits."""
+        """1 / depth (N,) in 1/m, 0 where nothing is hit, and the triangle (N,) hit first, -1 for none."""
         hit = self._nearest(origin, directions)
         met = hit >= 0
         # Far fewer triangles are visible than there are pixels: compute the plane of each once.
@@ -152,10 +160,9 @@ class SceneRayCaster:
         seen[hit[met]] = True
         place = (np.cumsum(seen) - 1)[hit[met]]
         planes = self._inverse_depth_planes(np.flatnonzero(seen), origin)
-        inverse_depth, index = np.zeros(len(hit)), np.zeros(len(hit), np.int64)
+        inverse_depth = np.zeros(len(hit))
         inverse_depth[met] = np.einsum("ij,ij->i", planes[place], directions[met])
-        index[met] = 1 + self.geometry.owners[hit[met]]
-        return inverse_depth, index
+        return inverse_depth, hit
 
     def _inverse_depth_planes(
         self, triangles: NDArray[np.intp], origin: NDArray[np.float64]

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.errors import DatasetError
 from scenes import Scene
 from scenes.geometry.mesh import Mesh
-from scenes.spec import Shape
+from scenes.spec import SceneObject, Shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +24,8 @@ class SceneGeometry:
     """(T, 3) indices into the vertices of all objects together."""
     owners: NDArray[np.int32]
     """(T,) index in `Scene.objects` of the object that each triangle belongs to."""
+    materials: NDArray[np.int32]
+    """(T,) index in `Scene.materials` of each triangle's material."""
 
     def local_vertices(self, index: int, time_frames: float) -> NDArray[np.float64]:
         """(V, 3) vertices of one object at an instant, deformed, in the mesh's own coordinates."""
@@ -46,7 +49,10 @@ class SceneGeometry:
 
 
 def build_geometry(scene: Scene) -> SceneGeometry:
-    """Build the meshes of a scene's objects, each distinct shape once."""
+    """Build the meshes of a scene's objects, each distinct shape once.
+
+    Raises DatasetError for an object with fewer materials than its mesh has slots for.
+    """
     built: dict[Shape, Mesh] = {}
     for thing in scene.objects:
         if thing.shape not in built:
@@ -58,4 +64,19 @@ def build_geometry(scene: Scene) -> SceneGeometry:
         + [mesh.triangles + np.int32(start) for mesh, start in zip(meshes, first, strict=False)]
     )
     owners = np.repeat(np.arange(len(meshes), dtype=np.int32), [len(mesh.triangles) for mesh in meshes])
-    return SceneGeometry(scene, meshes, triangles, owners)
+    materials = np.concatenate(
+        [np.zeros(0, np.int32)]
+        + [_materials_of(thing, mesh) for thing, mesh in zip(scene.objects, meshes, strict=True)]
+    )
+    return SceneGeometry(scene, meshes, triangles, owners, materials)
+
+
+def _materials_of(thing: SceneObject, mesh: Mesh) -> NDArray[np.int32]:
+    """(F,) index in `Scene.materials` of each triangle. Raises DatasetError for slots that the object has none for."""
+    if mesh.slots is None:
+        return np.full(len(mesh.triangles), thing.material, np.int32)
+    if not len(thing.materials) > mesh.slots.max(initial=0):
+        raise DatasetError(
+            f"object {thing.name!r} has {len(thing.materials)} materials for {mesh.slots.max() + 1} slots of its mesh"
+        )
+    return np.array(thing.materials, np.int32)[mesh.slots]

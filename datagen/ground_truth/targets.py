@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.dataset.layout import DIRECTIONS, Direction, View
-from datagen.ground_truth.raycast import SceneRayCaster
+from datagen.ground_truth.raycast import Hits, SceneRayCaster
 from datagen.ground_truth.scene_geometry import SceneGeometry
 from scenes import Scene
 
@@ -128,16 +128,13 @@ def find_surfaces(
     )
 
 
-def material_index(scene: Scene, object_index: NDArray[np.integer[Any]]) -> NDArray[np.uint16]:
-    """(H, W) 0 for the sky, else 1 + the index in `Scene.materials` of the object that (H, W) object_index names."""
-    worn = [0, *(1 + thing.material for thing in scene.objects)]
-    return np.array(worn, np.uint16)[object_index]
+def reflective(scene: Scene, material_index: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:
+    """(...) 255 where the material that (...) material_index names is glossy, metallic or transparent, else 0.
 
-
-def reflective(scene: Scene, object_index: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:
-    """(H, W) 255 where the object that (H, W) object_index names is glossy, metallic or transparent, else 0."""
-    shows = [False, *(scene.materials[thing.material].is_reflective for thing in scene.objects)]
-    return (np.array(shows) * np.uint8(255))[object_index]
+    material_index: 0 for the sky, else 1 + the index in `Scene.materials`.
+    """
+    shows = [False, *(material.is_reflective for material in scene.materials)]
+    return (np.array(shows) * np.uint8(255))[material_index]
 
 
 def object_edges(object_index: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
@@ -177,27 +174,22 @@ class ExtraTargets:
         """kinds: Names among `datagen.dataset.layout.EXTRA_TARGETS`."""
         self._caster, self._kinds = caster, kinds
 
-    def make(
-        self,
-        view: View,
-        frame: int,
-        object_index: NDArray[np.integer[Any]],
-        disparity: NDArray[np.float64],
-    ) -> dict[tuple[str, Direction | None], NDArray[Any]]:
+    def make(self, view: View, frame: int, hits: Hits) -> dict[tuple[str, Direction | None], NDArray[Any]]:
         """The arrays of one view and frame, by kind and direction of time.
 
-        frame: The instant, from 0. object_index, disparity: (H, W) of that view and frame.
+        frame: The instant, from 0. hits: Of all pixels (H, W) of that view and frame.
         """
         made: dict[tuple[str, Direction | None], NDArray[Any]] = {}
+        scene = self._caster.geometry.scene
         if "material_index" in self._kinds:
-            made["material_index", None] = material_index(self._caster.geometry.scene, object_index)
+            made["material_index", None] = hits.material_index.astype(np.uint16)
         if "depth" in self._kinds:
-            made["depth", None] = self._caster.geometry.scene.camera.depth(disparity).astype(np.float32)
+            made["depth", None] = scene.camera.depth(hits.disparity).astype(np.float32)
         if "reflective" in self._kinds:
-            made["reflective", None] = reflective(self._caster.geometry.scene, object_index)
+            made["reflective", None] = reflective(scene, hits.material_index)
         if set(self._kinds) <= {"depth", "material_index", "reflective"}:
             return made
-        pixels = np.indices(object_index.shape)
+        pixels = np.indices(hits.object_index.shape)
         surfaces = find_surfaces(self._caster, view, frame, pixels[0], pixels[1])
         if "normals" in self._kinds:
             made["normals", None] = surfaces.normals()
@@ -210,5 +202,5 @@ class ExtraTargets:
             if "optical_flow" in self._kinds:
                 made["optical_flow", direction] = flow
             if "motion_boundaries" in self._kinds:
-                made["motion_boundaries", direction] = motion_boundaries(flow, object_index)
+                made["motion_boundaries", direction] = motion_boundaries(flow, hits.object_index)
         return made

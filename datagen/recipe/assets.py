@@ -11,50 +11,36 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 from zipfile import is_zipfile
 
-import cv2
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from datagen.dataset.shards import cache_folder
 from datagen.errors import DatasetError, MachineError
 from datagen.executors import LocalExecutor, WorkerPolicy
-from datagen.formats.picture import read_picture
-from scenes.geometry.building import solid
+from datagen.recipe.preparation.meshes import MESH_SUFFIXES, REMARK, UpAxis, is_y_up, prepare_mesh
+from datagen.recipe.preparation.pictures import (
+    ENVIRONMENT_SUFFIXES,
+    TEXTURE_SUFFIXES,
+    prepare_environment,
+    prepare_texture,
+)
+from datagen.recipe.preparation.side_files import SideFiles
 from scenes.user_assets.pool import Asset, AssetPool, spread_over_splits
-from stereoforge_kit.errors import InputError
 from stereoforge_kit.files import replacing, temporary_folder, walk_files
 from stereoforge_kit.messages import shortened
 from stereoforge_kit.processes import Limits, available_memory_bytes
 
-MESH_SUFFIXES = (".obj", ".ply", ".glb", ".stl")
-TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
-ENVIRONMENT_SUFFIXES = (".hdr", ".exr")
-Y_UP = (".glb",)
-"""glTF says that y points up; the other formats say nothing, and z does here."""
-UpAxis = Literal["auto", "y", "z"]
-REMARK = "remark"
-"""What a preparer returns beside the arrays where it changed something that the user should know."""
-PREPARATION = 1
+PREPARATION = 2
 """Number of what the preparers do: files that another version prepared are prepared anew."""
 MAX_FILE_BYTES = 500 << 20
-MAX_TRIANGLES = 300_000
-"""Meshes of more are decimated (Garland and Heckbert, "Surface simplification using quadric error metrics", 1997)."""
-DRACO = b"KHR_draco_mesh_compression"
-MAX_GLTF_HEADER_BYTES = 1 << 24
-"""Of a GLB file's beginning, which names the extensions that it needs."""
-MAX_SIDE_PX = 4096
-"""Larger images are made smaller."""
-MEAN_LUMINANCE = 0.5
-"""Environments are scaled to this, so that they light a scene as the generator's own skies do."""
 MESH_LIMITS = Limits(timeout_s=120.0, memory_bytes=4 << 30)
 """A mesh of 1.3 million triangles takes more than 1 GB to weld and decimate."""
 PICTURE_LIMITS = Limits(timeout_s=60.0, memory_bytes=4 << 30)
@@ -87,20 +73,23 @@ def import_assets(
     textures: Path | None = None,
     environments: Path | None = None,
     up_axis: UpAxis = "auto",
+    keep_materials: bool = True,
     known: AssetPool | None = None,
     progress: ImportProgress | None = None,
 ) -> ImportedAssets:
     """Prepare all usable files below the given folders into `store`, as many at a time as there are cores.
 
     What the store has is not prepared again, so an interrupted import goes on where it was, and a folder that has grown
-    costs its new files. A mesh that is turned upright has another name in the store than the same file as it is.
+    costs its new files. A mesh that is turned upright has another name in the store than the same file as it is, and so
+    has one whose materials or pictures have changed. Meshes that share a picture are for one split.
 
     Args:
         store: The folder for the prepared files; made if need be. It may hold files of other imports too.
-        meshes: A folder of OBJ, PLY, GLB and STL files.
+        meshes: A folder of OBJ, PLY, glTF, GLB and STL files, with what they name: lists of materials, pictures.
         textures: A folder of PNG, JPEG, TIFF, WebP and BMP files.
-        environments: A folder of equirectangular Radiance HDR and OpenEXR files.
+        environments: A folder of equirectangular panoramas, Radiance HDR, OpenEXR and those of `textures`.
         up_axis: Which axis of the meshes points up, "y" or "z"; "auto" for what is usual in their format (`Y_UP`).
+        keep_materials: Whether meshes are to show their own textures: then those that share one are for one split.
         known: A pool whose files keep their splits, as a data set's that already shows some of them.
         progress: Called with how many files of a kind are done, how many there are, and the kind.
 
@@ -112,8 +101,9 @@ def import_assets(
     skipped: list[str] = []
     remarks: list[str] = []
     kinds: list[tuple[Asset, ...]] = []
+    sources: dict[str, tuple[str, ...]] = {}
     for kind, folder, suffixes, prepare, limits in (
-        ("meshes", meshes, MESH_SUFFIXES, partial(prepare_mesh, up_axis=up_axis), MESH_LIMITS),
+        ("meshes", meshes, MESH_SUFFIXES, partial(prepare_mesh, up_axis=up_axis, root=meshes), MESH_LIMITS),
         ("textures", textures, TEXTURE_SUFFIXES, prepare_texture, PICTURE_LIMITS),
         ("environments", environments, ENVIRONMENT_SUFFIXES, prepare_environment, PICTURE_LIMITS),
     ):
@@ -121,9 +111,16 @@ def import_assets(
             kinds.append(())
             continue
         report = None if progress is None else partial(progress, kind)
-        work = _FolderImport(suffixes, prepare, limits, store, partial(_identity, up_axis), report)
-        decided = () if known is None else getattr(known, kind)
-        kinds.append(spread_over_splits(work.run(folder, skipped, remarks), decided))
+        work = _FolderImport(suffixes, prepare, limits, store, partial(_identity, up_axis, folder), report)
+        names = work.run(folder, skipped, remarks)
+        decided = {} if known is None else {asset.sha256: asset.split for asset in getattr(known, kind)}
+        if kind == "meshes" and keep_materials:
+            sources = {sha256: _picture_sources(store, sha256) for sha256 in names}
+        elif kind == "textures":  # A picture that a mesh has too is for that mesh's split.
+            decided = {
+                source: mesh.split for mesh in kinds[0] for source in sources.get(mesh.sha256, ())
+            } | decided
+        kinds.append(spread_over_splits(names, decided, _sharing(sources) if kind == "meshes" else {}))
     pool = AssetPool(meshes=kinds[0], textures=kinds[1], environments=kinds[2])
     return ImportedAssets(pool, tuple(skipped), tuple(remarks))
 
@@ -152,9 +149,34 @@ def copy_prepared(pool: AssetPool, store: Path, target: Path) -> None:
                 shutil.copyfile(store / name, temporary)
 
 
-def _identity(up_axis: UpAxis, path: Path) -> bytes:
+def _identity(up_axis: UpAxis, folder: Path, path: Path) -> bytes:
     """What tells a prepared file from another one of the same original."""
-    return b"y up" if path.suffix.lower() in MESH_SUFFIXES and is_y_up(path, up_axis) else b""
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        return b""
+    return (b"y up" if is_y_up(path, up_axis) else b"") + SideFiles(path, folder).digest()
+
+
+def _picture_sources(store: Path, sha256: str) -> tuple[str, ...]:
+    """The SHA-256 of each picture that a prepared mesh has."""
+    with np.load(store / f"{sha256}.npz", allow_pickle=False) as arrays:
+        return tuple(map(str, arrays["sources"])) if "sources" in arrays.files else ()
+
+
+def _sharing(sources: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
+    """The group of each mesh that has pictures: those that share one, if only through others, are in one group."""
+    parent: dict[str, str] = {}
+
+    def root(name: str) -> str:
+        while (above := parent.setdefault(name, name)) != name:
+            parent[name] = parent.get(above, above)
+            name = above
+        return name
+
+    for mesh, pictures in sources.items():
+        for picture in pictures:
+            first, second = sorted((root(mesh), root(picture)))
+            parent[second] = first
+    return {mesh: root(mesh) for mesh, pictures in sources.items() if pictures}
 
 
 class _Outcome(NamedTuple):
@@ -262,102 +284,3 @@ def _prepare_file(prepare: Preparer, job: tuple[Path, Path]) -> _Outcome:
         np.savez(file, **arrays)
     temporary.replace(target)
     return _Outcome(remark=None if remark is None else str(remark))
-
-
-def prepare_mesh(path: Path, up_axis: UpAxis = "auto") -> dict[str, NDArray[np.generic]]:
-    """A mesh's `vertices` (V, 3), z upwards, `triangles` (T, 3) and `corner_uv` (3 T, 2).
-
-    With a remark if it is decimated to `MAX_TRIANGLES`.
-
-    Raises ValueError for a mesh of no use, and whatever the parser raises.
-    """
-    options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
-    with path.open("rb") as file:  # From an open file no parser looks for others beside it.
-        if path.suffix.lower() == ".glb" and DRACO in file.read(MAX_GLTF_HEADER_BYTES):
-            raise InputError("it is compressed with Draco, which is not read here; export it without")
-        file.seek(0)
-        loaded = trimesh.load(file, file_type=path.suffix[1:].lower(), force="mesh", process=False, **options)
-    vertices, triangles = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64)
-    if is_y_up(path, up_axis):
-        vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1)
-    if len(triangles) < 4:
-        raise InputError(f"it has {len(triangles)} triangles, too few for a thing")
-    if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise InputError("its triangles name vertices that are not there")
-    triangles = triangles[np.isfinite(vertices).all(axis=1)[triangles].all(axis=1)]
-    used, triangles = np.unique(triangles, return_inverse=True)
-    vertices, triangles = vertices[used], triangles.reshape(-1, 3)
-    if not len(triangles) or np.sort(np.ptp(vertices, axis=0))[1] == 0:
-        raise InputError("it has no surface")
-    prepared: dict[str, NDArray[np.generic]] = {}
-    if (count := len(triangles)) > MAX_TRIANGLES:
-        fewer = trimesh.Trimesh(vertices, triangles).simplify_quadric_decimation(face_count=MAX_TRIANGLES)
-        vertices, triangles = np.asarray(fewer.vertices, np.float64), np.asarray(fewer.faces, np.int64)
-        prepared[REMARK] = np.array(f"its {count:,} triangles are decimated to {len(triangles):,}")
-    mesh = solid(vertices, triangles, smooth=True)
-    if len(mesh.triangles) < 4:
-        raise InputError("its triangles have no area")
-    return prepared | {
-        "vertices": mesh.vertices,
-        "triangles": mesh.triangles,
-        "corner_uv": mesh.corner_uv,
-    }
-
-
-def is_y_up(path: Path, up_axis: UpAxis) -> bool:
-    """Whether y points up in a file, by what the user says or by its format."""
-    return up_axis == "y" or (up_axis == "auto" and path.suffix.lower() in Y_UP)
-
-
-def prepare_texture(path: Path) -> dict[str, NDArray[np.generic]]:
-    """A texture's `image`, (H, W, 3) uint8 sRGB, as `datagen.formats.picture` reads it.
-
-    Raises FormatError for a file of no use.
-    """
-    return {"image": _bounded(read_picture(path, longest_px=MAX_SIDE_PX))}
-
-
-def prepare_environment(path: Path) -> dict[str, NDArray[np.generic]]:
-    """An environment's `radiance`, (H, W, 3) float32 linear RGB; with a remark if some of it was infinite.
-
-    Raises ValueError for a file of no use, and whatever the parser raises.
-    """
-    radiance = _read_exr(path) if path.suffix.lower() == ".exr" else _read_hdr(path)
-    prepared: dict[str, NDArray[np.generic]] = {}
-    if (infinite := np.isposinf(radiance)).any():
-        # Half floats end at 65504, which a sun exceeds.
-        brightest = max(float(radiance[np.isfinite(radiance)].max(initial=0)), 0.0)
-        radiance = np.where(infinite, np.float32(brightest), radiance)
-        prepared[REMARK] = np.array(
-            f"its infinite values are taken for {brightest:g}, the brightest finite one"
-        )
-    radiance = np.nan_to_num(np.maximum(_bounded(radiance), 0), neginf=0.0)
-    luminance = float(radiance.mean())
-    if luminance <= 0:
-        raise InputError("it is black")
-    return prepared | {"radiance": (radiance * (MEAN_LUMINANCE / luminance)).astype(np.float32)}
-
-
-def _read_hdr(path: Path) -> NDArray[np.float32]:
-    image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None or image.ndim != 3 or image.dtype != np.float32:
-        raise InputError("it is no Radiance HDR picture")
-    return np.ascontiguousarray(image[..., 2::-1])
-
-
-def _read_exr(path: Path) -> NDArray[np.float32]:
-    import OpenEXR
-
-    with OpenEXR.File(str(path), separate_channels=True) as file:
-        channels = file.channels()
-        planes = [np.asarray(channels[name].pixels, np.float32) for name in "RGB"]
-    return np.stack(planes, axis=-1)
-
-
-def _bounded(image: NDArray[np.generic]) -> NDArray[np.generic]:
-    """The image, made smaller if it is larger than `MAX_SIDE_PX`."""
-    longest = max(image.shape[:2])
-    if longest <= MAX_SIDE_PX:
-        return image
-    size = tuple(max(1, length * MAX_SIDE_PX // longest) for length in image.shape[1::-1])
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))

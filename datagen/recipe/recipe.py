@@ -220,7 +220,8 @@ def recipe_from_plain(data: Any, origin: str, read_pool: Callable[[], bytes] | N
         data = {**data, "assets": {key: value for key, value in assets.items() if key != "pool"}}
     try:
         recipe = from_plain(data, Recipe)
-        return replace(recipe, assets=replace(pool, share=recipe.assets.share)) if pool else recipe
+        files = {kind: getattr(pool, kind) for kind in ASSET_KINDS}
+        return replace(recipe, assets=replace(recipe.assets, **files)) if pool else recipe
     except (ValueError, RecursionError) as error:
         raise DatasetError(
             f"{origin} is not a valid recipe: {shortened(str(error), LONGEST_REASON)}"
@@ -304,8 +305,10 @@ def recipe_to_plain(recipe: Recipe) -> dict[str, Any]:
     """A recipe as dicts, lists, strings and numbers, which `recipe_from_plain` takes."""
     plain: dict[str, Any] = to_plain(replace(recipe, assets=AssetPool()))
     if recipe.assets:
-        share = {} if recipe.assets.share is None else {"share": recipe.assets.share}
-        plain["assets"] = {"pool": pool_sha256(recipe.assets), **share}
+        settings = to_plain(replace(recipe.assets, meshes=(), textures=(), environments=()))
+        for kind in ASSET_KINDS:
+            del settings[kind]
+        plain["assets"] = {"pool": pool_sha256(recipe.assets), **settings}
     return plain
 
 

@@ -139,7 +139,7 @@ def render_frames(
                 for view in VIEWS:
                     hits = caster.cast_all(view, frame)
                     chosen = {name: images[view][name] for name in options.passes}
-                    extra = extra_targets.make(view, frame, hits.object_index, hits.disparity)
+                    extra = extra_targets.make(view, frame, hits)
                     targets[view] = _targets(chosen, hits, options.gradient_threshold_px, extra)
             yield frame, targets
     except RuntimeError as error:

@@ -151,7 +151,7 @@ def _listed(formats: Iterable[str]) -> str:
 def source_formats() -> dict[str, SourceFormat]:
     """All formats by their names."""
     import datagen.sources
-    from scenes.discovery import modules_in
+    from stereoforge_kit.discovery import modules_in
 
     return {
         kind.name: kind for module in modules_in(datagen.sources) for kind in getattr(module, "FORMATS", ())

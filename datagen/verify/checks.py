@@ -198,6 +198,13 @@ def check_derived(values: NDArray[Any], expected: NDArray[Any], origin: str) -> 
         yield f"{wrong} pixels do not follow from {origin}"
 
 
+def check_materials(values: NDArray[Any], expected: NDArray[Any]) -> Iterator[str]:
+    """Sampled values (N,) of a target that follows from the materials are those of the scene's geometry."""
+    yield from _too_many(
+        values != expected, MAX_OFF_GEOMETRY, "sampled materials are not those of the scene's geometry"
+    )
+
+
 def check_boundaries(marked: NDArray[np.bool_], expected: NDArray[np.bool_]) -> Iterator[str]:
     """Motion boundaries (H, W) agree with those of the scene's geometry at the pixels that either marks."""
     either = marked | expected

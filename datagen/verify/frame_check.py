@@ -16,7 +16,6 @@ from datagen.ground_truth.raycast import SceneRayCaster
 from datagen.ground_truth.targets import (
     PixelSurfaces,
     find_surfaces,
-    material_index,
     motion_boundaries,
     object_edges,
     reflective,
@@ -30,6 +29,7 @@ from datagen.verify.checks import (
     check_geometry,
     check_gradient,
     check_images,
+    check_materials,
     check_object_index,
     check_vectors,
     check_views,
@@ -127,9 +127,10 @@ class FrameCheck:
             surfaces = find_surfaces(self.caster, view, sample.frame - FIRST_FRAME, rows, columns)
         index = sample.view(view).object_index
         if index.max() <= len(self.scene.objects):  # Otherwise that is the problem and has been reported.
-            for kind, stored, expected in self._of_materials(view, index):
-                for message in check_derived(stored, expected, "the objects' materials"):
-                    yield self._file(kind, view), message
+            for kind in ("material_index", "reflective"):
+                if kind in kinds:
+                    for message in self._check_materials(view, kind):
+                        yield self._file(kind, view), message
         if "depth" in kinds:
             for message in check_depth(sample.depth(view), sample.view(view).disparity, self.scene.camera):
                 yield self._file("depth", view), message
@@ -143,15 +144,29 @@ class FrameCheck:
         if "motion_boundaries" in kinds:
             yield from self._check_boundaries(view)
 
-    def _of_materials(
-        self, view: View, index: NDArray[np.uint16]
-    ) -> Iterator[tuple[str, NDArray[Any], NDArray[Any]]]:
-        """Kind, stored and expected values of the targets that follow from the objects' materials."""
-        sample, kinds = self.samples[0], self.recipe.targets
-        if "material_index" in kinds:
-            yield "material_index", sample.material_index(view), material_index(self.scene, index)
-        if "reflective" in kinds:
-            yield "reflective", sample.reflective(view), reflective(self.scene, index)
+    def _check_materials(self, view: View, kind: str) -> Iterator[str]:
+        """A target that follows from the materials has, in each pixel, a value that one of the object's materials has.
+
+        Which one of several shows the geometry alone, at the sampled pixels.
+        """
+        sample, scene = self.samples[0], self.scene
+        index, stored = sample.view(view).object_index, getattr(sample, kind)(view)
+
+        def value(materials: Any) -> NDArray[Any]:
+            named = np.asarray(materials)
+            return named if kind == "material_index" else reflective(scene, named)
+
+        first = value([0, *(1 + thing.material for thing in scene.objects)])
+        expected = first[index]
+        for number, thing in enumerate(scene.objects, start=1):
+            if thing.more_materials:
+                own = (index == number) & np.isin(stored, value([1 + one for one in thing.materials]))
+                expected[own] = stored[own]
+        yield from check_derived(stored, expected, "the objects' materials")
+        if self.caster is not None:
+            rows, columns = self._sampled(view)
+            hits = self.caster.cast(view, sample.frame - FIRST_FRAME, rows, columns)
+            yield from check_materials(stored[rows, columns], value(hits.material_index))
 
     def _check_motion(
         self, view: View, direction: Direction, surfaces: PixelSurfaces | None

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.appearance.lights import sample_area_light, sample_sun
-from scenes.appearance.materials import sample_material
+from scenes.appearance.materials import SurfaceShares, sample_material
 from scenes.family import Family, FamilyConfig, crowd_share
 from scenes.motion.trajectories import exposure_times, quaternion, shifted, vector, wander
 from scenes.placement.assembly import Assembly
@@ -33,12 +33,11 @@ from scenes.spec import (
     SceneObject,
     Shape,
     SunLight,
-    Texture,
     Trajectory,
     World,
 )
 from scenes.textures.sky import Sky
-from scenes.user_assets.pool import Asset, AssetPool, UserEnvironment, UserMesh, UserTexture
+from scenes.user_assets.pool import Asset, AssetPool, UserTexture
 from stereoforge_kit.errors import InputError
 
 _SHAPE_FILL = 1.8
@@ -84,6 +83,18 @@ class FlyingThingsConfig(FamilyConfig):
     """How far the camera looks down."""
     roll_deg: Range = (-4.0, 4.0)
     """Roll of the camera."""
+    plain_share: float = 0.2
+    """How many materials are of one colour."""
+    glossy_share: float = 0.12
+    """How many materials are lacquered or polished, so that they mirror what is around."""
+    metallic_share: float = 0.1
+    """How many materials are metal."""
+    transparent_share: float = 0.05
+    """How many materials are glass. Ground truth is of the glass."""
+    lattice_share: float = 0.1
+    """How many objects are lattices, wire frames, perforated plates and the like: many matches are equally good."""
+    rows: Count = (0, 2)
+    """Rows of equal things on the ground per scene, like posts and columns, at any distance."""
     suns: Count = (1, 2)
     area_lights: Count = (0, 4)
     sky_strength: Range = (0.7, 1.8)
@@ -99,6 +110,11 @@ class FlyingThingsConfig(FamilyConfig):
     """The user assets of the split; `with_assets` fills them in."""
     complexity: float = 1.0
     """0 few things of plain shapes, 1 as many and as complicated as the other ranges say."""
+
+    @property
+    def surfaces(self) -> SurfaceShares:
+        """The shares of kinds of surfaces among the materials."""
+        return SurfaceShares(self.plain_share, self.glossy_share, self.metallic_share, self.transparent_share)
 
     def with_assets(self, assets: AssetPool) -> FlyingThingsConfig:
         share = self.user_share if assets.share is None else assets.share
@@ -133,6 +149,7 @@ class FlyingThingsConfig(FamilyConfig):
         super().__post_init__()
         if not 0 <= self.complexity <= 1:
             raise InputError(f"flying_things: complexity must be from 0 to 1, got {self.complexity}")
+        _ = self.surfaces
         for name in ("focal_mm", "baseline_m", "disparity_share", "background_disparity_share"):
             if getattr(self, name)[0] <= 0:
                 raise InputError(f"flying_things: {name} must be above 0, got {getattr(self, name)}")
@@ -186,8 +203,9 @@ def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -
     scene = Assembly()
     scene.add(_ground(rng, rig, land, scene))
     background = _background(rng, rig, land, scene)
+    rows = _rows(rng, rig, land, scene)
     flyers = _flyers(rng, rig, land, scene)
-    scene.add(*background, *flyers)
+    scene.add(*background, *rows, *flyers)
     return Scene(
         family="flying_things",
         frames=config.frames,
@@ -195,7 +213,7 @@ def sample_flying_things(rng: np.random.Generator, config: FlyingThingsConfig) -
         objects=scene.objects,
         materials=tuple(scene.materials),
         lights=_lights(rng, rig),
-        world=World(_environment(rng, config), uniform(rng, *config.sky_strength)),
+        world=_world(rng, config),
         exposure_key=uniform(rng, 0.18, 0.32),
         notes={"flying_objects": float(len(flyers)), "background_objects": float(len(background))},
         final=_final(rng, rig),
@@ -258,7 +276,7 @@ def _sample_land(rng: np.random.Generator, rig: _Rig) -> _Land:
 def _ground(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -> SceneObject:
     # Its texture is sharp where the ground is at a few times the nearest depth.
     unit_px = land.half_m * rig.camera.focal_px / (3 * rig.nearest_m)
-    return ground_object(land, scene.material(sample_material(rng, unit_px, 512)))
+    return ground_object(land, scene.material(sample_material(rng, unit_px, 512, rig.config.surfaces)))
 
 
 _BACKGROUND_SHAPES: dict[str, float] = {"Box": 0.3, "DeformedCylinder": 0.2, "Cylinder": 0.08}
@@ -267,10 +285,17 @@ _PLAIN_SHAPES: dict[str, float] = {"Box": 0.4, "Cylinder": 0.3, "Superquadric": 
 """Kinds of all flying objects at complexity 0; their share falls to none at complexity 1."""
 
 
-def _sample_shape(rng: np.random.Generator, plain: dict[str, float] | None = None) -> Shape:
-    """A random shape: of the `plain` kinds with their shares, else of any kind by popularity."""
+_LATTICES = ("Lattice", "WireFrame", "HoledPlate", "Spring")
+"""Kinds that repeat themselves."""
+_ROW_SHAPES = ("Box", "Column", "Cylinder", "DeformedCylinder", "Lathe", "Pole", "Superquadric")
+"""Kinds of things that stand in rows."""
+
+
+def _sample_shape(rng: np.random.Generator, favoured: dict[str, float], lattice_share: float) -> Shape:
+    """A random shape: of the `favoured` kinds with their shares, a lattice with its own, else of any by popularity."""
+    lattices = dict.fromkeys(_LATTICES, lattice_share / len(_LATTICES))
     drawn = rng.random()
-    for name, share in (plain or {}).items():
+    for name, share in (*lattices.items(), *favoured.items()):
         drawn -= share
         if drawn < 0:
             return SHAPES[name].sample(rng)
@@ -281,7 +306,8 @@ def _sample_shape(rng: np.random.Generator, plain: dict[str, float] | None = Non
 def _background(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -> list[SceneObject]:
     """Objects standing or lying on the ground in view, near ones small, far ones up to skyline size."""
     kinds = rig.config.count(rng, rig.config.background_materials)
-    materials = [scene.material(sample_material(rng, 0.08 * rig.camera.width)) for _ in range(kinds)]
+    surfaces, unit_px = rig.config.surfaces, 0.08 * rig.camera.width
+    materials = [scene.material(sample_material(rng, unit_px, shares=surfaces)) for _ in range(kinds)]
     count = rig.config.count(rng, rig.config.background_objects)
     depths_m = [rig.depth(uniform(rng, *rig.config.background_disparity_share)) for _ in range(count)]
     spots = np.array([rig.point(uniform(rng, -1.25, 1.25), 0.0, depth_m) for depth_m in depths_m])
@@ -296,12 +322,43 @@ def _background(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembl
         things.append(
             SceneObject(
                 name=f"background {index}",
-                shape=_sample_shape(rng, _BACKGROUND_SHAPES),
+                shape=_sample_shape(rng, _BACKGROUND_SHAPES, rig.config.lattice_share),
                 material=choose(rng, materials),
                 motion=Trajectory.static(vector(spot + sunk), quaternion(turn)),
                 scale_m=vector(size_m * rng.uniform(0.75, 1.25, 3)),
             )
         )
+    return things
+
+
+def _rows(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -> list[SceneObject]:
+    """Rows of equal things on the ground, across the view or slanting, as far as the background or nearer."""
+    things = []
+    for number in range(rig.config.count(rng, rig.config.rows)):
+        shape = SHAPES[choose(rng, list(_ROW_SHAPES))].sample(rng)
+        low, high = rig.config.background_disparity_share
+        depth_m = rig.depth(
+            log_uniform(rng, low, max(low, min(4 * high, 0.5 * rig.config.disparity_share[1])))
+        )
+        size_m = depth_m * rig.half_view[0] * log_uniform(rng, 0.02, 0.09)
+        material = scene.material(
+            sample_material(rng, size_m / depth_m * rig.camera.focal_px, shares=rig.config.surfaces)
+        )
+        scale = size_m * np.array((1.0, 1.0, uniform(rng, 1.0, 3.5)))
+        gap_m, slant = 2 * size_m * log_uniform(rng, 1.15, 3.0), uniform(rng, 0.0, 0.8)
+        count = min(integer(rng, 6, 24), 2 + int(2.4 * rig.half_view[0] * depth_m / gap_m))
+        turn = quaternion(Rotation.from_euler("Z", uniform(rng, 0.0, 360.0), degrees=True))
+        first = rig.point(uniform(rng, -1.0, 0.3), 0.0, depth_m)
+        right, ahead = rig.pose[:3, 0], -rig.pose[:3, 2]
+        step = gap_m * (right + slant * ahead) / math.hypot(1.0, slant)
+        spots = first + np.arange(count)[:, None] * step
+        spots[:, 2] = land.height_m(spots[:, :2]) + 0.9 * scale[2] * float(shape.mesh().vertices[:, 2].max())
+        things += [
+            SceneObject(
+                f"row {number} {k}", shape, material, Trajectory.static(vector(spot), turn), vector(scale)
+            )
+            for k, spot in enumerate(spots)
+        ]
     return things
 
 
@@ -313,40 +370,58 @@ def _flyers(rng: np.random.Generator, rig: _Rig, land: _Land, scene: Assembly) -
     for index in range(count):
         cover = min(each * math.exp(rng.normal(-0.1, 0.5)), 0.12)
         size_px = math.sqrt(cover * rig.camera.width * rig.camera.height / _SHAPE_FILL)
-        material = scene.material(_flyer_material(rng, rig.config, size_px))
-        flyers.append(_flyer(rng, rig, f"flying {index}", material, size_px, land.level_m))
+        material = _flyer_material(rng, rig.config, size_px)
+        flyers.append(_flyer(rng, rig, f"flying {index}", material, size_px, land.level_m, scene))
     return flyers
 
 
 def _flyer_material(rng: np.random.Generator, config: FlyingThingsConfig, size_px: float) -> Material:
-    material = sample_material(rng, size_px)
+    material = sample_material(rng, size_px, shares=config.surfaces)
     own = config.draw_user_asset(rng, config.assets.textures)
     return material if own is None else replace(material, color=UserTexture(own.sha256))
 
 
-def _environment(rng: np.random.Generator, config: FlyingThingsConfig) -> Texture:
+def _world(rng: np.random.Generator, config: FlyingThingsConfig) -> World:
     sky = Sky.sample(rng, 1024)
     own = config.draw_user_asset(rng, config.assets.environments)
-    return sky if own is None else UserEnvironment(own.sha256)
+    world = World(sky, uniform(rng, *config.sky_strength))
+    return world if own is None else config.assets.world(world, own)
 
 
 def _flyer(
-    rng: np.random.Generator, rig: _Rig, name: str, material: int, size_px: float, floor_m: float
+    rng: np.random.Generator,
+    rig: _Rig,
+    name: str,
+    material: Material,
+    size_px: float,
+    floor_m: float,
+    scene: Assembly,
 ) -> SceneObject:
-    """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth."""
+    """One flying object whose half extent spans `size_px`, wholly behind the nearest allowed depth.
+
+    One of the user's that keeps its size is where that spans `size_px`, or as near to there as things in flight are.
+    """
     config = rig.config
-    shape = _sample_shape(
-        rng, {name: share * (1 - config.complexity) for name, share in _PLAIN_SHAPES.items()}
-    )
+    materials: tuple[Material, ...] = (material,)
+    favoured = {name: share * (1 - config.complexity) for name, share in _PLAIN_SHAPES.items()}
+    shape = _sample_shape(rng, favoured, config.lattice_share * config.complexity)
+    kept_m = None
     if own := config.draw_user_asset(rng, config.assets.meshes):
-        shape = UserMesh(own.sha256)
+        shape = mesh = config.assets.mesh(own)
+        materials = (mesh.materials() if mesh.own_materials else ()) or materials
+        kept_m = mesh.half_size() if config.assets.keep_size else None
     stretch = rng.uniform(0.8, 1.25, 3)
     near_share = config.disparity_share[1]
-    depth_m = rig.depth(uniform(rng, min(0.15 * near_share, near_share), near_share))
+    farthest_share = min(0.15 * near_share, near_share)
+    depth_m = rig.depth(uniform(rng, farthest_share, near_share))
     relative = size_px / rig.camera.focal_px
+    if kept_m is not None:
+        stretch = np.ones(3)
+        depth_m = float(np.clip(kept_m / relative, rig.nearest_m, rig.depth(farthest_share)))
+        relative = kept_m / depth_m
     # The front of a ball of radius relative * depth about the centre stays behind the nearest depth.
     depth_m = max(depth_m, rig.nearest_m / max(1 - _REACH * relative, 0.2))
-    size_m = relative * depth_m
+    size_m = relative * depth_m if kept_m is None else kept_m
     place = rig.point(uniform(rng, -0.95, 0.95), uniform(rng, -0.95, 0.95), depth_m)
     place[2] = max(place[2], floor_m + 0.7 * size_m)
     motion = wander(
@@ -361,7 +436,10 @@ def _flyer(
     )
     scale = size_m * stretch
     reach_m = float(np.linalg.norm(shape.mesh().vertices * scale, axis=1).max())
-    return SceneObject(name, shape, material, _kept_away(motion, reach_m, rig), vector(scale))
+    first, *more = (scene.material(one) for one in materials)
+    return SceneObject(
+        name, shape, first, _kept_away(motion, reach_m, rig), vector(scale), more_materials=tuple(more)
+    )
 
 
 def _kept_away(motion: Trajectory, reach_m: float, rig: _Rig) -> Trajectory:

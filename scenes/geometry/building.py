@@ -5,6 +5,7 @@ All functions take (V, 3) float64 vertices and (F, 3) triangles.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -38,25 +39,48 @@ def solid(
     With `smooth`, edges sharper than `crease_deg` stay sharp: their vertices are split. None says that there
     are no such edges.
     """
-    vertices, factor = fit_to_cube(vertices)
+    mesh, corners = traced_solid(
+        vertices, triangles, smooth=smooth, crease_deg=crease_deg, box_mapped=uv is None
+    )
+    if uv is None:
+        return mesh
+    _, factor = fit_to_cube(vertices)
+    return replace(mesh, corner_uv=np.ascontiguousarray(uv.reshape(-1, 2)[corners] * factor, np.float32))
+
+
+def traced_solid(
+    vertices: Vertices,
+    triangles: Triangles,
+    *,
+    smooth: bool = False,
+    crease_deg: float | None = 40.0,
+    box_mapped: bool = True,
+) -> tuple[Mesh, NDArray[np.intp]]:
+    """A Mesh as `solid` makes it, and where the corners of its triangles come from.
+
+    These are, (F, 3), the places of its corners among those of the given triangles, of which triangle k has 3 k to
+    3 k + 2. Without `box_mapped` the mesh has no texture coordinates.
+    """
+    vertices, _ = fit_to_cube(vertices)
     vertices, triangles, kept, normals = _merged(vertices, triangles)
-    if uv is not None:
-        uv = uv[kept] * factor
+    corners = 3 * np.asarray(kept)[:, None] + np.arange(3)
     # The divergence theorem: positive when the triangles run counter-clockwise seen from outside.
     if np.einsum("ij,ij->", vertices[triangles[:, 0]], normals) < 0:
-        triangles = triangles[:, ::-1]
-        uv = None if uv is None else uv[:, ::-1]
-        normals = -normals
-    if uv is None:
-        uv = mesh_kernels.dominant_plane_uv(vertices, triangles, normals)
+        triangles, corners, normals = triangles[:, ::-1], corners[:, ::-1], -normals
+    uv = (
+        mesh_kernels.dominant_plane_uv(vertices, triangles, normals)
+        if box_mapped
+        else np.zeros((len(triangles), 3, 2))
+    )
     if smooth and crease_deg is not None:
         vertices, triangles = split_creases(vertices, triangles, normals, crease_deg)
-    return Mesh(
+    mesh = Mesh(
         np.ascontiguousarray(vertices),
         np.ascontiguousarray(triangles, np.int32),
         np.ascontiguousarray(uv, np.float32),
         smooth,
     )
+    return mesh, corners
 
 
 def fit_to_cube(vertices: Vertices) -> tuple[Vertices, float]:

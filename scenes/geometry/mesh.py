@@ -21,3 +21,5 @@ class Mesh:
     shapes)."""
     smooth: bool = False
     """Whether shading normals are interpolated over the surface (geometry is unaffected)."""
+    slots: NDArray[np.int32] | None = None
+    """(F,) which of its object's materials each triangle has (`SceneObject.materials`); None for the first."""

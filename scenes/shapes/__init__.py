@@ -2,8 +2,8 @@
 
 import sys
 
-from scenes.discovery import concrete_subclasses
 from scenes.spec import Shape
+from stereoforge_kit.discovery import concrete_subclasses
 
 SHAPES: dict[str, type[Shape]] = concrete_subclasses(sys.modules[__name__], Shape)  # type: ignore[type-abstract]
 """Every shape by class name."""

@@ -2,8 +2,8 @@
 
 import sys
 
-from scenes.discovery import concrete_subclasses
 from scenes.spec import Texture
+from stereoforge_kit.discovery import concrete_subclasses
 
 TEXTURES: dict[str, type[Texture]] = concrete_subclasses(sys.modules[__name__], Texture)  # type: ignore[type-abstract]
 """Every texture by class name."""

@@ -88,13 +88,20 @@ class Render:
     recipe: Annotated[Path | None, shown("FILE", "none")] = None
     """A recipe.yaml to render."""
     meshes: Annotated[Path | None, shown("DIR", "none")] = None
-    """Your own OBJ, PLY, GLB and STL files, for things among the generated ones; each is used in one split only."""
+    """Your own OBJ, PLY, glTF, GLB and STL files, with their materials and textures, for things among the generated
+    ones; each is used in one split only."""
     up_axis: Annotated[Literal["auto", "y", "z"], shown("auto|y|z")] = "auto"
-    """Which axis of your meshes points up; auto: y in GLB files, as glTF has it, and z in the others."""
+    """Which axis of your meshes points up; auto: y in glTF and GLB files, as glTF has it, and z in the others."""
+    mesh_materials: Annotated[Literal["keep", "replace"] | None, shown("keep|replace", "keep")] = None
+    """Whether your meshes keep the materials that their files have or get the family's own."""
+    keep_size: bool = False
+    """Take your meshes' units as metres, instead of scaling each to what it replaces."""
     textures: Annotated[Path | None, shown("DIR", "none")] = None
     """Your own pictures, to paint things with."""
     environments: Annotated[Path | None, shown("DIR", "none")] = None
-    """Your own equirectangular HDR and EXR pictures, to light the worlds."""
+    """Your own equirectangular panoramas, HDR, EXR, JPEG or PNG, to light the worlds."""
+    environment_exposure: Annotated[float | None, shown("EV", 0)] = None
+    """How much brighter your panoramas shine than the generated skies, in stops; below 0 they are darker."""
     own_share: Annotated[float | None, shown("SHARE", 0.5)] = None
     """Share from 0 to 1 of the things, surfaces and skies that can be replaced to make from your own files."""
     disparity_range: Annotated[str | None, shown("LOW,HIGH", "the family's")] = None
@@ -121,6 +128,11 @@ class Render:
                 raise UsageError(f"--own-share must be above 0 and at most 1, got {self.own_share:g}")
             if not (self.meshes or self.textures or self.environments):
                 raise UsageError("--own-share goes with --meshes, --textures or --environments")
+        for flag in ("mesh_materials", "keep_size"):
+            if getattr(self, flag) and not self.meshes:
+                raise UsageError(f"--{flag.replace('_', '-')} goes with --meshes")
+        if self.environment_exposure is not None and not self.environments:
+            raise UsageError("--environment-exposure goes with --environments")
         if self.dry_run and self.only_failed:
             raise UsageError(
                 "--dry-run counts what is missing, not what is in quarantine: leave --only-failed out"
@@ -156,7 +168,7 @@ class Render:
         with prepared_assets_folder() as store:
             present = Layout(Path(self.out)).recipe
             known = read_recipe(present).assets if present.is_file() else recipe.assets
-            imported = self._import(store, known)
+            imported = self._import(store, known, self._asset_settings(recipe.assets).keep_materials)
             for sentence in imported.skipped:
                 remark(f"skipped {sentence}")
             for sentence in (*imported.remarks, *describe_splits(imported.pool)):
@@ -164,15 +176,27 @@ class Render:
             try:
                 require_assets(imported.pool, (split for split, count in recipe.scenes.items() if count))
                 given = {kind: getattr(imported.pool, kind) for kind in ASSET_KINDS if getattr(self, kind)}
-                share = self.own_share or recipe.assets.share
-                recipe = replace(recipe, assets=replace(recipe.assets, **given, share=share))
-            except DatasetError as error:
+                recipe = replace(recipe, assets=replace(self._asset_settings(recipe.assets), **given))
+            except InputError as error:
                 raise UsageError(str(error)) from error
             render_dataset(replace(recipe, scenes={}), self.out)  # Claims the folder, or refuses it.
             copy_prepared(imported.pool, store, Layout(Path(self.out)).assets)
         return recipe
 
-    def _import(self, store: Path, known: AssetPool) -> ImportedAssets:
+    def _asset_settings(self, before: AssetPool) -> AssetPool:
+        """The recipe's settings for user assets, changed as the flags say."""
+        changes: dict[str, Any] = {}
+        if self.own_share is not None:
+            changes["share"] = self.own_share
+        if self.mesh_materials is not None:
+            changes["keep_materials"] = self.mesh_materials == "keep"
+        if self.keep_size:
+            changes["keep_size"] = True
+        if self.environment_exposure is not None:
+            changes["environment_ev"] = self.environment_exposure
+        return replace(before, **changes)
+
+    def _import(self, store: Path, known: AssetPool, keep_materials: bool) -> ImportedAssets:
         with progress_bar() as progress:
             task = progress.add_task("preparing your files", total=None)
             return import_assets(
@@ -181,6 +205,7 @@ class Render:
                 textures=self.textures,
                 environments=self.environments,
                 up_axis=self.up_axis,
+                keep_materials=keep_materials,
                 known=known,
                 progress=lambda kind, done, total: progress.update(
                     task, completed=done, total=total, description=f"preparing {kind}"

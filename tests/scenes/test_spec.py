@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from scenes import discovery
 from scenes.motion.trajectories import exposure_times, key_times, quaternion, shifted, wander
 from scenes.shapes.solids.basic import Box
 from scenes.spec import SceneObject, StereoCamera, Texture, Trajectory
 from scenes.textures.plain import SolidColor
+from stereoforge_kit import discovery
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -2,8 +2,8 @@
 
 import sys
 
-from scenes.discovery import concrete_subclasses
 from scenes.spec import Deformation
+from stereoforge_kit.discovery import concrete_subclasses
 
 DEFORMATIONS: dict[str, type[Deformation]] = concrete_subclasses(
     sys.modules[__name__],

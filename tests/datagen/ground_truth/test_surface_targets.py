@@ -180,9 +180,7 @@ def test_flow_disparity_change_and_normals_have_their_closed_form(
     normals = found.normals()[expected.hit & ~rim]
     assert np.abs(normals - expected.normal).max() < 1e-5
     hits = SceneRayCaster(build_geometry(moving_plane(stretch, rig))).cast_all(view, NOW)
-    made = ExtraTargets(SceneRayCaster(found.geometry), ("depth",)).make(
-        view, 0, hits.object_index, hits.disparity
-    )
+    made = ExtraTargets(SceneRayCaster(found.geometry), ("depth",)).make(view, 0, hits)
     np.testing.assert_allclose(made["depth", None][~rim], expected.depth[~rim], rtol=1e-5)
     # What would be wrong: half a pixel, the sign, the direction, the other view, a forgotten deformation.
     other_view: View = "right" if view == "left" else "left"
@@ -210,7 +208,7 @@ def test_only_what_was_asked_for_is_made(kinds: tuple[str, ...], monkeypatch: py
     monkeypatch.setattr(PixelSurfaces, "flow", counted)
     caster = SceneRayCaster(build_geometry(moving_plane(KINDS["rigid"])))
     hits = caster.cast_all("left", NOW)
-    made = ExtraTargets(caster, kinds).make("left", NOW, hits.object_index, hits.disparity)
+    made = ExtraTargets(caster, kinds).make("left", NOW, hits)
     assert {kind for kind, _ in made} == set(kinds)
     assert followed == (list(DIRECTIONS) if {"optical_flow", "motion_boundaries"} & set(kinds) else [])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import re
+import struct
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -24,18 +25,10 @@ from datagen.errors import FormatError
 from datagen.export import EXPORTERS, ExportOptions
 from datagen.formats.picture import read_picture
 from datagen.recipe.asset_pool import describe_splits, pool_to_text, require_assets
-from datagen.recipe.assets import (
-    MAX_SIDE_PX,
-    MAX_TRIANGLES,
-    ImportedAssets,
-    UpAxis,
-    _FolderImport,
-    copy_prepared,
-    import_assets,
-    prepare_environment,
-    prepare_mesh,
-    prepare_texture,
-)
+from datagen.recipe.assets import ImportedAssets, _FolderImport, copy_prepared, import_assets
+from datagen.recipe.preparation.mesh_surfaces import MAX_SIDE_PX
+from datagen.recipe.preparation.meshes import MAX_TRIANGLES, UpAxis, prepare_mesh
+from datagen.recipe.preparation.pictures import prepare_environment, prepare_texture
 from datagen.recipe.recipe import recipe_from_text, recipe_to_text, write_recipe
 from datagen.rendering.estimate import estimate_run
 from datagen.verify.dataset_check import verify_dataset
@@ -158,7 +151,7 @@ def test_a_file_keeps_its_split_when_the_pool_grows(before: int) -> None:
     for _ in range(30):
         every = names(rng, before + int(rng.integers(1, 10)))
         first = spread_over_splits(dict(list(every.items())[:before]))
-        grown = spread_over_splits(every, first)
+        grown = spread_over_splits(every, {asset.sha256: asset.split for asset in first})
         assert {*first} <= {*grown}
         assert len(grown) == len(every)
         if before > 1:
@@ -356,9 +349,9 @@ def test_fine_meshes_are_decimated(tmp_path: Path) -> None:
 
 
 def test_draco_and_empty_files_are_called_by_their_name(tmp_path: Path) -> None:
-    (tmp_path / "a.glb").write_bytes(
-        b"glTF\2\0\0\0" + b'{"extensionsRequired": ["KHR_draco_mesh_compression"]}'
-    )
+    header = b'{"extensionsRequired": ["KHR_draco_mesh_compression"]}'
+    start = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(header), len(header), b"JSON")
+    (tmp_path / "a.glb").write_bytes(start + header)
     (tmp_path / "b.stl").write_bytes(b"")
     trimesh.creation.box().export(tmp_path / "c.stl")
     skipped = import_assets(tmp_path / "store", meshes=tmp_path).skipped
@@ -488,3 +481,132 @@ def test_meshes_stand_as_their_format_says(
         if upright:  # Its tip is above.
             tip = vertices[np.argmax(vertices[:, 2])]
             assert np.abs(tip[:2]).max() < 0.01
+
+
+def test_panoramas_may_be_jpeg_png_or_layered_exr(tmp_path: Path) -> None:
+    levels = np.tile(np.linspace(20, 230, 64).astype(np.uint8)[None, :, None], (32, 1, 3))
+    assert cv2.imwrite(str(tmp_path / "sky.png"), levels)
+    radiance = prepare_environment(tmp_path / "sky.png")["radiance"]
+    linear = ((levels / 255 + 0.055) / 1.055) ** 2.4
+    np.testing.assert_allclose(radiance / radiance[0, 0], linear / linear[0, 0], rtol=0.02)
+    assert radiance.mean() == pytest.approx(0.5, rel=1e-3)
+    assert cv2.imwrite(str(tmp_path / "wide.jpg"), np.tile(levels, (1, 3, 1)))
+    assert "not 2:1" in str(prepare_environment(tmp_path / "wide.jpg")["remark"])
+    plane = np.random.default_rng(0).uniform(0.1, 2, (32, 64)).astype(np.float32)
+    layers = {f"ViewLayer.Normal.{c}": np.ones_like(plane) for c in "XYZ"}
+    layers |= {f"ViewLayer.DiffCol.{c}": np.ones_like(plane) for c in "RGB"}
+    layers |= {f"ViewLayer.Combined.{c}": plane * (1 + k) for k, c in enumerate("RGBA")}
+    OpenEXR.File({}, layers).write(str(tmp_path / "layers.exr"))
+    prepared = prepare_environment(tmp_path / "layers.exr")
+    np.testing.assert_allclose(
+        prepared["radiance"], np.stack([plane, 2 * plane, 3 * plane], -1) * (0.25 / plane.mean()), rtol=1e-4
+    )
+    assert "ViewLayer.Combined" in str(prepared["remark"])
+    OpenEXR.File({}, {"Y": plane}).write(str(tmp_path / "grey.exr"))
+    assert np.ptp(prepare_environment(tmp_path / "grey.exr")["radiance"], axis=2).max() == 0
+    OpenEXR.File({}, {"Z": plane}).write(str(tmp_path / "depth.exr"))
+    with pytest.raises(ValueError, match="no layer with R, G and B"):
+        prepare_environment(tmp_path / "depth.exr")
+
+
+def test_what_a_set_does_with_the_files_is_in_its_recipe(imported: ImportedAssets) -> None:
+    settings = {"keep_materials": False, "keep_size": True, "environment_ev": -1.5}
+    pool = replace(imported.pool, **settings)
+    recipe = Recipe(FAMILIES["flying_things"].config(user_share=1.0), {"train": 1}, assets=pool)
+    files = pool_to_text(pool).encode()
+    assert pool_to_text(imported.pool) == pool_to_text(pool)
+    assert recipe_from_text(recipe_to_text(recipe).encode(), "recipe", lambda: files) == recipe
+    plain = replace(recipe, assets=imported.pool)
+    assert "keep" not in recipe_to_text(plain)
+    assert "environment_ev" not in recipe_to_text(plain)
+    dim, usual = recipe.sample("train", 0).world, plain.sample("train", 0).world
+    assert dim.strength == pytest.approx(usual.strength / 2**1.5)
+    with pytest.raises(ValueError, match="within 20 stops"):
+        replace(pool, environment_ev=float("nan"))
+
+
+@pytest.mark.parametrize("family", ["flying_things", "driving", "indoor"])
+def test_meshes_that_keep_their_size_are_as_large_as_their_files_say(family: str, tmp_path: Path) -> None:
+    lengths = {"small": 0.2, "middling": 0.7, "large": 1.5, "tower": 60.0}
+    (tmp_path / "meshes").mkdir()
+    for k, (name, length) in enumerate(lengths.items()):
+        trimesh.creation.box((length / 2, length / 2 + 1e-3 * k, length)).export(
+            tmp_path / f"meshes/{name}.stl"
+        )
+    found = import_assets(tmp_path / "store", meshes=tmp_path / "meshes")
+    use_store(tmp_path / "store")
+    files = tuple(replace(asset, split="train") for asset in found.pool.meshes)
+    name_of = {asset.sha256: asset.name.removesuffix(".stl") for asset in files}
+    pool = AssetPool(meshes=files, keep_size=True, share=1.0)
+    recipe = Recipe(FAMILIES[family].config(), {"train": 1}, assets=pool)
+    shown = set()
+    for index in range(3):
+        scene = recipe.sample("train", index)
+        for thing in scene.objects:
+            if isinstance(thing.shape, UserMesh):
+                name = name_of[thing.shape.sha256]
+                shown.add(name)
+                low, high = world_box(
+                    [
+                        replace(
+                            thing,
+                            motion=replace(
+                                thing.motion,
+                                rotations=((1.0, 0.0, 0.0, 0.0),) * len(thing.motion.times_frames),
+                            ),
+                        )
+                    ]
+                )
+                assert high[2] - low[2] == pytest.approx(lengths[name], rel=1e-6)
+                eye = scene.camera.pose("left", 0.0)[:3, 3]
+                assert np.linalg.norm(thing.motion.pose(0.0)[:3, 3] - eye) > lengths[name] / 2
+    assert "small" in shown
+    assert ("tower" in shown) == (family == "flying_things"), "elsewhere it would stand in other things"
+
+
+def test_meshes_that_share_a_texture_are_in_one_split(tmp_path: Path) -> None:
+    """A network that learned the texture must not meet it again in the test."""
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    for k in range(8):
+        picture = np.random.default_rng(k // 2).integers(0, 255, (8, 8, 3), np.uint8)
+        name = f"shared_{k // 2}.png"
+        cv2.imwrite(str(folder / name), picture)
+        ball = trimesh.creation.icosphere(1, 1.0 + k)
+        uv = ball.vertices[:, :2] / (2.0 + 2 * k) + 0.5
+        ball.visual = trimesh.visual.TextureVisuals(uv=uv, image=Image.open(folder / name))
+        if k % 2:  # Embedded, the same picture is the same too.
+            tree = json.loads(trimesh.exchange.gltf.export_gltf(trimesh.Scene(ball))["model.gltf"])
+            files = trimesh.exchange.gltf.export_gltf(trimesh.Scene(ball))
+            tree["images"] = [{"uri": name}]
+            (folder / f"{k}.gltf").write_text(
+                json.dumps(tree | {"buffers": [b | {"uri": f"{k}_{b['uri']}"} for b in tree["buffers"]]})
+            )
+            for buffer in tree["buffers"]:
+                (folder / f"{k}_{buffer['uri']}").write_bytes(files[buffer["uri"]])
+        else:
+            lines = [f"mtllib {k}.mtl", "usemtl skin", *(f"v {x} {y} {z}" for x, y, z in ball.vertices)]
+            lines += [
+                *(f"vt {u} {v}" for u, v in uv),
+                *(f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in ball.faces + 1),
+            ]
+            (folder / f"{k}.obj").write_text("\n".join(lines))
+            (folder / f"{k}.mtl").write_text(f"newmtl skin\nmap_Kd {name}\n")
+    found = import_assets(tmp_path / "store", meshes=folder, textures=folder)
+    assert found.skipped == ()
+    split = {asset.name: asset.split for asset in (*found.pool.meshes, *found.pool.textures)}
+    assert len(split) == 12
+    for k in range(4):
+        assert split[f"{2 * k}.obj"] == split[f"{2 * k + 1}.gltf"] == split[f"shared_{k}.png"]
+    assert {*split.values()} == {"train", "val", "test"}
+    use_store(tmp_path / "store")
+    for asset in found.pool.meshes:
+        (material,) = UserMesh(asset.sha256, own_materials=True).materials()
+        assert material.color.image().shape == (8, 8, 3)
+    # Another texture under the same name makes another mesh.
+    cv2.imwrite(str(folder / "shared_0.png"), np.zeros((8, 8, 3)))
+    again = import_assets(tmp_path / "store", meshes=folder)
+    changed = {asset.name for asset in {*again.pool.meshes} - {*found.pool.meshes}}
+    assert {"0.obj", "1.gltf"} <= changed
+    before = {asset.sha256 for asset in found.pool.meshes}
+    assert sum(asset.sha256 not in before for asset in again.pool.meshes) == 2

@@ -8,8 +8,17 @@ import numpy as np
 import pytest
 
 from scenes.appearance.lights import sample_area_light, sample_light_color, sample_sun
-from scenes.appearance.materials import FINISHES, TEXEL_PX, sample_material, sample_texture
+from scenes.appearance.materials import (
+    FINISHES,
+    TEXEL_PX,
+    SurfaceShares,
+    sample_material,
+    sample_plain,
+    sample_texture,
+)
+from scenes.spec import GLOSSY
 from scenes.textures import TEXTURES
+from scenes.textures.plain import NearTextureless, SolidColor
 
 
 def test_most_materials_are_diffuse_and_every_other_kind_occurs() -> None:
@@ -26,6 +35,29 @@ def test_most_materials_are_diffuse_and_every_other_kind_occurs() -> None:
     assert 0.01 < share([m.transmission > 0 for m in materials]) < 0.06
     assert 0.01 < share([m.emission > 0 for m in materials]) < 0.06
     assert len(FINISHES) >= 7
+
+
+@pytest.mark.parametrize(
+    "shares", [SurfaceShares(0.5, 0.3, 0.2, 0.1), SurfaceShares(1, 0, 0, 0), SurfaceShares(0, 0, 0, 1)]
+)
+def test_a_family_says_how_many_surfaces_are_of_which_kind(shares: SurfaceShares) -> None:
+    rng = np.random.default_rng(7)
+    materials = [sample_material(rng, 100.0, 16, shares) for _ in range(1500)]
+    plain = [isinstance(material.color, SolidColor | NearTextureless) for material in materials]
+    glossy = [m.specular > 0 and m.roughness <= GLOSSY and not m.transmission for m in materials]
+    assert np.mean(plain) == pytest.approx(shares.plain, abs=0.05)
+    assert np.mean(glossy) == pytest.approx(shares.glossy, abs=0.04)
+    assert np.mean([m.metallic > 0 for m in materials]) == pytest.approx(shares.metallic, abs=0.04)
+    assert np.mean([m.transmission > 0 for m in materials]) == pytest.approx(shares.transparent, abs=0.04)
+    with pytest.raises(ValueError, match="at most 1 together"):
+        SurfaceShares(0, 0.5, 0.4, 0.2)
+
+
+def test_plain_surfaces_have_hardly_any_pattern() -> None:
+    rng = np.random.default_rng(8)
+    spread = [np.ptp(sample_plain(rng, 64).image().astype(int), axis=(0, 1)).max() for _ in range(40)]
+    assert np.median(spread) < 40
+    assert min(spread) == 0
 
 
 def test_textures_are_drawn_by_popularity() -> None:

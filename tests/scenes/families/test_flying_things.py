@@ -132,6 +132,33 @@ def test_counts_focal_length_and_baseline_are_in_the_ranges_asked_for() -> None:
     assert 0.1 <= min(baseline) < 0.25 < 0.35 < max(baseline) <= 0.5
 
 
+def test_rows_are_of_equal_things_that_stand_on_the_ground_beyond_what_flies_nearest() -> None:
+    config = dataclasses.replace(SMALL, background_objects=(1, 1), flying_objects=(1, 1), rows=(2, 2))
+    for seed in range(4):
+        scene = sampled(seed, config)
+        nearest_m = scene.camera.disparity_metres / (config.disparity_share[1] * config.width)
+        for name in ("row 0 ", "row 1 "):
+            things = [k for k, thing in enumerate(scene.objects) if thing.name.startswith(name)]
+            row = [scene.objects[k] for k in things]
+            assert len(row) >= 2
+            assert len({(thing.shape, thing.material, thing.scale_m) for thing in row}) == 1
+            places = np.array([thing.motion.positions_m[0] for thing in row])[:, :2]
+            np.testing.assert_allclose(np.diff(places, 2, axis=0), 0, atol=1e-6)
+            pose = scene.camera.pose("left", 0.0)
+            for k in things:
+                assert ((world_corners(scene, k, 0.0) - pose[:3, 3]) @ -pose[:3, 2]).min() > nearest_m
+
+
+def test_lattices_are_as_many_as_asked_for() -> None:
+    for share in (0.0, 0.9):
+        config = dataclasses.replace(SMALL, lattice_share=share, rows=(0, 0))
+        kinds = [type(thing.shape).__name__ for seed in range(2) for thing in sampled(seed, config).objects]
+        found = np.mean([kind in ("Lattice", "WireFrame", "HoledPlate", "Spring") for kind in kinds])
+        assert share - 0.1 < found < share + 0.15
+    with pytest.raises(ValueError, match="at most 1 together"):
+        FlyingThingsConfig(glossy_share=0.9, metallic_share=0.2)
+
+
 def test_everything_scales_with_the_baseline() -> None:
     wide, narrow = (
         first_hits(sampled(3, dataclasses.replace(SMALL, baseline_m=(b, b))), 0.0).share for b in (1.0, 0.01)

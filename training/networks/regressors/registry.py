@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 
 import training.networks.regressors
-from scenes.discovery import concrete_subclasses
+from stereoforge_kit.discovery import concrete_subclasses
 from training.errors import TrainingError
 from training.networks.regressors.interface import Regressor, RegressorConfig
 

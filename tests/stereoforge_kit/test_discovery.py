@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from scenes.discovery import modules_in
+from stereoforge_kit.discovery import modules_in
 
 
 @pytest.mark.parametrize("folder", ["", "late", "early"])

@@ -1,0 +1,1 @@
+"""Reading the user's own files: meshes with their materials, pictures and panoramas become plain arrays."""
