@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from scenes.appearance import street_materials
-from scenes.placement.assembly import Assembly, anchored_object
-from scenes.random_draws import Range, chance, choose, integer, uniform
+from scenes.appearance import street_materials, vehicle_materials
+from scenes.appearance.materials import Shares
+from scenes.placement.assembly import Assembly
+from scenes.random_draws import Range, chance, choose, integer, new_seed, uniform
 from scenes.shapes.anchored import MetricShape
 from scenes.shapes.street.boundaries import Fence, Hedge
 from scenes.shapes.street.buildings import (
@@ -24,7 +24,9 @@ from scenes.shapes.street.buildings import (
 )
 from scenes.shapes.street.road import Course
 from scenes.shapes.street.roadside_plants import Shrub
-from scenes.streets.along_course import on_course
+from scenes.shapes.street.shops import ShopGoods, ShopPanes, ShopRoom
+from scenes.streets.along_course import add_in_spans, on_course
+from scenes.streets.config import DrivingConfig
 
 
 @dataclass(frozen=True)
@@ -99,16 +101,23 @@ class _Style:
 
 
 def add_houses(
-    rng: np.random.Generator, scene: Assembly, course: Course, side: Side, start_m: float, lit: float
+    rng: np.random.Generator,
+    scene: Assembly,
+    config: DrivingConfig,
+    course: Course,
+    side: Side,
+    start_m: float,
+    lit: float,
 ) -> None:
     """A row of houses along one side, of a few designs, each house with its own wall."""
     district = side.district
     if not district.houses:
         return
     walls = [
-        scene.material(street_materials.wall(rng, district.plastered)) for _ in range(integer(rng, 2, 3))
+        scene.material(street_materials.wall(rng, district.plastered, config.shares))
+        for _ in range(integer(rng, 2, 3))
     ]
-    styles = [_sample_style(rng, scene, district, lit) for _ in range(integer(rng, 2, 3))]
+    styles = [_sample_style(rng, scene, config.shares, district, lit) for _ in range(integer(rng, 2, 3))]
     gap_m = uniform(rng, *district.gap_m)
     s, number = start_m + uniform(rng, 0.0, 8.0), 0
     while True:
@@ -141,23 +150,46 @@ def _room_for(course: Course, side: Side, s_m: float, design: HouseDesign) -> tu
     return step_m, float(np.abs(curvature).max()) * design.width**2 / 8
 
 
-def _sample_style(rng: np.random.Generator, scene: Assembly, district: District, lit: float) -> _Style:
+def _sample_style(
+    rng: np.random.Generator, scene: Assembly, shares: Shares, district: District, lit: float
+) -> _Style:
     design = HouseDesign.sample(rng, choose(rng, district.houses))
     frame = choose(rng, street_materials.WINDOW_FRAMES)
     windows = street_materials.windows(rng, design.opening, design.sill, NOMINAL_BAY_M, frame, lit)
     upper = scene.material(windows)
-    ground = scene.material(street_materials.shop_window(rng, lit)) if design.shop else upper
     parts: list[tuple[str, MetricShape, int]] = [
         ("trim", HouseTrim(design), scene.material(street_materials.trim(rng))),
-        ("ground floor windows", HouseWindows(design, ground=True), ground),
         ("roof", HouseRoof(design), scene.material(street_materials.roof(rng))),
     ]
+    if design.shop and chance(rng, shares.transparent):
+        parts += _open_shop(rng, scene, design, lit)
+    else:
+        ground = scene.material(street_materials.shop_window(rng, lit)) if design.shop else upper
+        parts.append(("ground floor windows", HouseWindows(design, ground=True), ground))
     if design.floors > 1:
         parts.append(("windows", HouseWindows(design, ground=False), upper))
     if design.shop:
         front = replace(ShopFront.sample(rng), width=design.width, height=design.ground_floor - 0.72)
         parts.append(("shop front", front, scene.material(street_materials.shop_board(rng))))
     return _Style(design, HouseWalls(design), tuple(parts))
+
+
+def _open_shop(
+    rng: np.random.Generator, scene: Assembly, design: HouseDesign, lit: float
+) -> list[tuple[str, MetricShape, int]]:
+    """Shops that one sees into: panes, rooms, goods."""
+    return [
+        ("panes", ShopPanes(design), scene.material(vehicle_materials.clear_glass(rng))),
+        ("shop", ShopRoom(design, integer(rng, 1, 3)), scene.material(street_materials.shop_room(rng, lit))),
+        *(
+            (
+                f"goods {kind}",
+                ShopGoods(design, new_seed(rng)),
+                scene.material(street_materials.shop_goods(rng, lit)),
+            )
+            for kind in range(2)
+        ),
+    ]
 
 
 def _add_house(
@@ -182,23 +214,28 @@ def _add_house(
 
 
 def add_boundary(
-    rng: np.random.Generator, scene: Assembly, course: Course, side: Side, start_m: float, end_m: float
+    rng: np.random.Generator,
+    scene: Assembly,
+    config: DrivingConfig,
+    course: Course,
+    side: Side,
+    start_m: float,
+    end_m: float,
 ) -> None:
     """Fences, walls or hedges between the pavement and what lies behind, with gaps for gates."""
     if side.front_m - side.edge_m < 1.5 or not side.district.boundary:
         return
     kind = choose(rng, side.district.boundary)
-    shape: MetricShape
+    shape: Fence | Hedge
     if kind == "hedge":
         t = side.sign * (side.edge_m + 0.5)
-        shape = replace(Hedge.sample(rng, course), from_m=start_m, to_m=end_m, t_m=t)
+        shape = replace(Hedge.sample(rng, course), t_m=t)
         material = street_materials.foliage(rng)
     else:
         t = side.sign * (side.edge_m + 0.2)
-        shape = replace(Fence.sample(rng, kind, course), from_m=start_m, to_m=end_m, t_m=t)
-        material = street_materials.fence(rng, kind)
-    name, index = "fence " + "LR"[side.sign < 0], scene.material(material)
-    scene.add(anchored_object(name, shape, index, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
+        shape = replace(Fence.sample(rng, kind, course), t_m=t)
+        material = street_materials.fence(rng, kind, config.shares)
+    add_in_spans(scene, "fence " + "LR"[side.sign < 0], shape, scene.material(material), start_m, end_m)
 
 
 def add_garden(

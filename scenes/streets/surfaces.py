@@ -9,12 +9,14 @@ from scipy.spatial.transform import Rotation
 
 from scenes.appearance import street_materials
 from scenes.placement.assembly import Assembly, anchored_object
-from scenes.random_draws import chance, integer, uniform
+from scenes.random_draws import chance, integer, new_seed, uniform
 from scenes.shapes.anchored import MetricShape
+from scenes.shapes.street.puddles import Puddles
 from scenes.shapes.street.road import Course, Kerb, LevelGround, RoadMarkings, RoadStrip, Stripe
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive
+from scenes.streets.weather import Weather
 
 _LAND_M = 900.0
 """How far the land reaches around the street."""
@@ -31,7 +33,12 @@ class Ground:
 
 
 def lay_ground(
-    rng: np.random.Generator, scene: Assembly, config: DrivingConfig, drive: Drive, sides: tuple[Side, Side]
+    rng: np.random.Generator,
+    scene: Assembly,
+    config: DrivingConfig,
+    drive: Drive,
+    sides: tuple[Side, Side],
+    weather: Weather,
 ) -> Ground:
     """Add all surfaces of the ground."""
     course = drive.course
@@ -39,18 +46,21 @@ def lay_ground(
     road = (left.kerb_m, -right.kerb_m, uniform(rng, 0.0, 0.06))
     kerb_height = uniform(rng, *config.kerb_m)
     crossings = _crossings(rng)
-    tarmac = scene.material(street_materials.asphalt(rng))
+    asphalt = street_materials.asphalt(rng)
+    tarmac = scene.material(weather.wetted(asphalt))
     _lay(
         scene,
         "road",
         RoadStrip(course, course.start_m, course.end_m, road[0], road[1], 0.0, 0.4, road[2]),
         tarmac,
     )
-    _paint(rng, scene, drive, road, crossings)
-    _repairs(rng, scene, course, road)
+    _paint(rng, scene, drive, road, crossings, weather)
+    _repairs(rng, scene, course, road, weather)
+    if weather.wetness > 0.4:
+        _puddles(rng, scene, drive, road, scene.material(weather.standing_water(asphalt)))
     stone, paving = (
-        scene.material(street_materials.kerb_stone(rng)),
-        scene.material(street_materials.pavement(rng)),
+        scene.material(weather.wetted(street_materials.kerb_stone(rng))),
+        scene.material(weather.wetted(street_materials.pavement(rng))),
     )
     lawn = scene.material(street_materials.grass(rng))
     for side in sides:
@@ -103,6 +113,7 @@ def _paint(
     drive: Drive,
     road: tuple[float, float, float],
     crossings: tuple[float, ...],
+    weather: Weather,
 ) -> None:
     course = drive.course
     half = uniform(rng, 0.05, 0.08)
@@ -125,11 +136,12 @@ def _paint(
     for middle in crossings:
         stripes += _zebra(rng, drive, road, middle)
     yellow = chance(rng, 0.25)
-    white = scene.material(street_materials.road_paint(rng))
+    white = scene.material(weather.wetted(street_materials.road_paint(rng)))
+    middle = scene.material(weather.wetted(street_materials.road_paint(rng, True))) if yellow else white
     centre = [piece for stripe in centre for piece in _interrupted(stripe, crossings)]
     stripes = [piece for stripe in stripes for piece in _interrupted(stripe, crossings)]
     groups = [
-        ("centre line", centre, scene.material(street_materials.road_paint(rng, True)) if yellow else white),
+        ("centre line", centre, middle),
         ("markings", stripes, white),
     ]
     for name, items, material in groups:
@@ -179,8 +191,26 @@ def _interrupted(stripe: Stripe, crossings: tuple[float, ...]) -> list[Stripe]:
     return pieces
 
 
+def _puddles(
+    rng: np.random.Generator, scene: Assembly, drive: Drive, road: tuple[float, float, float], water: int
+) -> None:
+    """Water that stands along the kerbs, in the outer quarters of the road's camber."""
+    quarter = (road[0] - road[1]) / 4
+    spots = []
+    for _ in range(integer(rng, 3, 14)):
+        wide = uniform(rng, 0.2, 0.42) * min(quarter, 2.4)
+        inwards = uniform(rng, wide + 0.05, quarter - wide)
+        t = road[0] - inwards if chance(rng, 0.5) else road[1] + inwards
+        spots.append((uniform(rng, 3.0, 0.6 * drive.view_m), t, uniform(rng, 0.5, 3.5), wide))
+    _lay(scene, "puddles", Puddles(drive.course, tuple(spots), road, new_seed(rng)), water)
+
+
 def _repairs(
-    rng: np.random.Generator, scene: Assembly, course: Course, road: tuple[float, float, float]
+    rng: np.random.Generator,
+    scene: Assembly,
+    course: Course,
+    road: tuple[float, float, float],
+    weather: Weather,
 ) -> None:
     """Patches of newer tarmac, seams and covers; thinner than the road paint, which runs over them."""
     patches = []
@@ -194,4 +224,4 @@ def _repairs(
         patches.append(Stripe(s, s + long, t + wide, t - wide, shear=uniform(rng, -0.2, 0.2)))
     if patches:
         shape = RoadMarkings(course, tuple(patches), road, thickness_m=0.003)
-        _lay(scene, "repairs", shape, scene.material(street_materials.tarmac_patch(rng)))
+        _lay(scene, "repairs", shape, scene.material(weather.wetted(street_materials.tarmac_patch(rng))))

@@ -149,6 +149,14 @@ class RoadStrip(MetricShape):
         return Surface(vertices, triangles, uv[triangles])
 
 
+def crown_height(road: tuple[float, float, float], t_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Height above the edges of a road with a left edge, a right edge and a crown (metres), at distances `t_m`."""
+    left, right, crown = road
+    # A strip is flat between quarter points of its parabola.
+    quarter = np.linspace(0.0, 1.0, 5)
+    return np.interp((left - t_m) / (left - right), quarter, crown * 4 * quarter * (1 - quarter))
+
+
 @dataclass(frozen=True)
 class Stripe:
     """A painted bar: a rectangle in street coordinates, or a slanted one."""
@@ -180,12 +188,6 @@ class RoadMarkings(MetricShape):
         stripes = tuple(Stripe(float(s), float(s) + dash, width / 2, -width / 2) for s in starts)
         return cls(course, stripes, (4.0, -4.0, 0.05 if chance(rng, 0.5) else 0.0))
 
-    def _height(self, t_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        left, right, crown = self.road
-        # The strip below is flat between quarter points of its parabola.
-        quarter = np.linspace(0.0, 1.0, 5)
-        return np.interp((left - t_m) / (left - right), quarter, crown * 4 * quarter * (1 - quarter))
-
     def surface(self) -> Surface:
         return Surface(*joined(*(self._bar(stripe) for stripe in self.stripes)))
 
@@ -199,7 +201,7 @@ class RoadMarkings(MetricShape):
         )
         s = s + stripe.shear * np.linspace(0.0, 1.0, columns)
         plan = self.course.point(s, t).reshape(-1, 2)
-        height = self._height(t).ravel()
+        height = crown_height(self.road, t).ravel()
         vertices = np.concatenate(
             [
                 np.column_stack([plan, height + self.thickness_m]),
