@@ -24,6 +24,7 @@ from scenes.streets.config import DrivingConfig
 from scenes.streets.daylight import HOURS, Daylight, sample_daylight
 from scenes.streets.frontage import DISTRICTS, Side, add_boundary, add_garden, add_houses, add_skyline
 from scenes.streets.headlights import beams
+from scenes.streets.junctions import build_side_street, line_side_street, side_streets, with_openings
 from scenes.streets.rig import Drive, sample_camera, sample_drive
 from scenes.streets.roadside import (
     Pavement,
@@ -45,9 +46,12 @@ def sample_driving(rng: np.random.Generator, config: DrivingConfig) -> Scene:
     camera = sample_camera(rng, config, drive)
     weather = sample_weather(rng, config)
     daylight = sample_daylight(rng, config, weather.raining)
-    sides = _sample_sides(rng, config, drive)
+    sides = with_openings(rng, config, _sample_sides(rng, config, drive))
     scene = Assembly()
     ground = lay_ground(rng, scene, config, drive, sides, weather)
+    joining = side_streets(rng, drive, sides)
+    for street in joining:
+        build_side_street(rng, scene, street, ground.surfacing)
     underfoot = len(scene.groups)
     pavements = (Pavement(sides[0]), Pavement(sides[1]))
     fleet = sample_fleet(rng, scene, config, keep_left=drive.keep_left, lit=daylight.lamps_on)
@@ -64,6 +68,8 @@ def sample_driving(rng: np.random.Generator, config: DrivingConfig) -> Scene:
         add_trees(rng, scene, config, drive, pavement, ground.pavement_m)
         add_furniture(rng, scene, config, drive, pavement, ground.pavement_m)
         add_people(rng, scene, config, drive, pavement, ground.pavement_m)
+    for street in joining:
+        line_side_street(rng, scene, config, street, fleet, daylight.windows_lit)
     add_skyline(rng, scene, drive.course, sides)
     view = View(camera, config.frames)
     kept = keep_clear(
@@ -115,7 +121,15 @@ def _sample_sides(rng: np.random.Generator, config: DrivingConfig, drive: Drive)
         kerb = drive.half_road_m + (PARKING_M if parking else uniform(rng, 0.1, 0.4))
         edge = kerb + uniform(rng, *config.pavement_m)
         sides.append(
-            Side(sign, district, kerb, edge, edge + 0.05 + uniform(rng, *district.setback_m), parking)
+            Side(
+                sign,
+                district,
+                kerb,
+                edge,
+                edge + 0.05 + uniform(rng, *district.setback_m),
+                parking,
+                "LR"[sign < 0],
+            )
         )
     return sides[0], sides[1]
 

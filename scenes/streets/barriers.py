@@ -68,4 +68,5 @@ def add_barrier(
     )
     material = scene.material(street_materials.fence(rng, kind.style, config.shares))
     end_m = min(to_m, drive.course.end_m)
-    add_in_spans(scene, f"barrier {'LR'[side.sign < 0]}", shape, material, from_m, end_m)
+    for number, (low, high) in enumerate(side.stretches(from_m, end_m)):
+        add_in_spans(scene, f"barrier {side.name}{number}", shape, material, low, high)

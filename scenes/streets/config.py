@@ -50,6 +50,8 @@ class DrivingConfig(FamilyConfig):
     """How many streets are straight."""
     bend_deg: Range = (6.0, 32.0)
     """How much a winding street may turn within 50 m."""
+    junction_share: float = 0.35
+    """How many streets have a side street in view, or one on either side."""
     view_m: Range = (100.0, 170.0)
     """Length of the street before the camera."""
     lanes: Count = (1, 2)

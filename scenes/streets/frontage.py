@@ -72,6 +72,17 @@ DISTRICTS: dict[str, District] = {
 
 
 @dataclass(frozen=True)
+class Opening:
+    """Where a side street joins."""
+
+    s_m: float
+    """Of its middle."""
+    half_road_m: float
+    half_m: float
+    """Half its width with its pavements."""
+
+
+@dataclass(frozen=True)
 class Side:
     """One side of the street in street coordinates; `sign` is 1 on the left, -1 on the right."""
 
@@ -85,6 +96,24 @@ class Side:
     """Distance of the house fronts."""
     parking: bool
     """Whether a parking lane runs along the kerb."""
+    name: str
+    """What its things are told apart by: L, R; for side streets more letters."""
+    openings: tuple[Opening, ...] = ()
+
+    def is_open(self, s_m: float, reach_m: float) -> bool:
+        """Whether what reaches `reach_m` to both sides of s would stand in the mouth of a side street."""
+        return any(abs(s_m - opening.s_m) < opening.half_m + reach_m for opening in self.openings)
+
+    def stretches(self, start_m: float, end_m: float, *, of_kerb: bool = False) -> list[tuple[float, float]]:
+        """From and to s of what lies between the openings, up to the road for kerbs, else up to the pavements."""
+        edges = [start_m]
+        for opening in self.openings:
+            half = opening.half_road_m if of_kerb else opening.half_m
+            edges += [opening.s_m - half, opening.s_m + half]
+        edges.append(end_m)
+        pieces = zip(edges[::2], edges[1::2], strict=True)
+        within = [(max(low, start_m), min(high, end_m)) for low, high in pieces]
+        return [(low, high) for low, high in within if high > low]
 
     def turn_deg(self) -> float:
         """Rotation at which a thing's y axis points away from the street, degrees."""
@@ -125,9 +154,12 @@ def add_houses(
         step_m, back_m = _room_for(course, side, s, style.design)
         if s + step_m > course.end_m - 4.0:
             return
+        if side.is_open(s + step_m / 2, step_m / 2):
+            s = max(opening.s_m + opening.half_m for opening in side.openings) + 0.05
+            continue
         _add_house(
             scene,
-            f"house {'LR'[side.sign < 0]}{number}",
+            f"house {side.name}{number}",
             style,
             choose(rng, walls),
             course,
@@ -235,7 +267,9 @@ def add_boundary(
         t = side.sign * (side.edge_m + 0.2)
         shape = replace(Fence.sample(rng, kind, course), t_m=t)
         material = street_materials.fence(rng, kind, config.shares)
-    add_in_spans(scene, "fence " + "LR"[side.sign < 0], shape, scene.material(material), start_m, end_m)
+    index = scene.material(material)
+    for number, (low, high) in enumerate(side.stretches(start_m, end_m)):
+        add_in_spans(scene, f"fence {side.name}{number}", shape, index, low, high)
 
 
 def add_garden(
@@ -250,7 +284,9 @@ def add_garden(
     for number in range(integer(rng, 0, 10)):
         shrub = choose(rng, kinds)
         s, t = uniform(rng, start_m, end_m), side.sign * (side.edge_m + uniform(rng, 1.3, depth - 0.9))
-        name, turn = f"shrub {'LR'[side.sign < 0]}{number}", uniform(rng, 0.0, 360.0)
+        name, turn = f"shrub {side.name}{number}", uniform(rng, 0.0, 360.0)
+        if side.is_open(s, 1.2):
+            continue
         scene.add(*on_course(name, [("", shrub, leaves)], course, s, t, turn_deg=turn))
 
 
@@ -264,6 +300,8 @@ def add_skyline(rng: np.random.Generator, scene: Assembly, course: Course, sides
         side = choose(rng, sides)
         aside = uniform(rng, 0.0, 60.0) if ahead else side.front_m + uniform(rng, 45.0, 140.0)
         block = CityBlock.sample(rng)
+        if side.is_open(s, block.width):
+            continue
         turn, material = uniform(rng, -30.0, 30.0), choose(rng, materials)
         parts = [("", block, material)]
         scene.add(*on_course(f"block {number}", parts, course, s, side.sign * aside, turn_deg=turn))

@@ -61,8 +61,10 @@ class Pavement:
     def take(self, s_m: float, t_m: float, reach_m: float, travel_m: float = 0.0) -> bool:
         """Take a disc of radius `reach_m` at (s, t) if it is free; False if it is not.
 
-        The disc moves by up to `travel_m` along the street either way.
+        The disc moves by up to `travel_m` along the street either way. The mouths of side streets stay free.
         """
+        if self.side.is_open(s_m, reach_m + travel_m):
+            return False
         for s, t, reach, travel in self._taken:
             apart = max(abs(s - s_m) - travel - travel_m, 0.0)
             if math.hypot(apart, t - t_m) < reach + reach_m:
@@ -85,7 +87,7 @@ class Pavement:
 
     def name(self, what: str, number: int) -> str:
         """A name for a thing on this pavement, different on both."""
-        return f"{what} {'LR'[self.side.sign < 0]}{number}"
+        return f"{what} {self.side.name}{number}"
 
 
 def add_lamps(
@@ -110,7 +112,9 @@ def add_lamps(
         s, number = drive.course.start_m + uniform(rng, 2.0, spacing), 0
         while s < drive.course.end_m - 2.0:
             t = pavement.near_kerb(0.5)
-            pavement.take(s, t, 0.4)
+            if not pavement.take(s, t, 0.4):
+                s += 2.0
+                continue
             # The arm's x axis points over the street.
             turn = -90.0 if pavement.side.sign > 0 else 90.0
             scene.add(
@@ -286,7 +290,8 @@ def add_traffic_lights(
             ahead = (pavement.side.sign > 0) == drive.keep_left
             s = crossing + (-2.6 if ahead else 2.6)
             t = pavement.near_kerb(0.45)
-            pavement.take(s, t, 0.3)
+            if not pavement.take(s, t, 0.3):
+                continue
             # Its arm is along y: over the street when the light is turned towards its traffic.
             turn = 180.0 if ahead else 0.0
             over = 1.0 if (turn == 0.0) == (pavement.side.sign < 0) else -1.0
@@ -350,7 +355,7 @@ class _Wardrobe:
         # Shapes keep their meshes, so people of one design share the shapes too.
         self.bodies = [
             (PersonTop(d), PersonLegs(d), PersonSkin(d), PersonFeatures(d), PersonHair(d), PersonThings(d))
-            for d in (PersonDesign.sample(rng) for _ in range(4))
+            for d in (PersonDesign.sample(rng) for _ in range(3))
         ]
         self.clothes = [scene.material(street_materials.cloth(rng, shares)) for _ in range(7)]
         self.things = [scene.material(street_materials.leather(rng)) for _ in range(3)]

@@ -336,15 +336,29 @@ def add_parked(
         if middle + model.length / 2 > drive.course.end_m - 2.0:
             return
         s += model.length + uniform(rng, 0.7, 1.8)
-        if any(abs(middle - crossing) < 5.0 + model.length / 2 for crossing in crossings) or not chance(
-            rng, taken
-        ):
+        reach = 5.0 + model.length / 2
+        blocked = side.is_open(middle, reach) or any(abs(middle - crossing) < reach for crossing in crossings)
+        if blocked or not chance(rng, taken):
             continue
         room = PARKING_M / 2 - model.half_width - _swing_m(drive.course, model, middle, middle)
         if room < 0.0:
             continue
         t = side.sign * (side.kerb_m - PARKING_M / 2 + uniform(rng, -1.0, 1.0) * room)
         turn = 0.0 if with_traffic != chance(rng, 0.12) else 180.0
-        name = f"parked {'LR'[side.sign < 0]}{number}"
+        name = f"parked {side.name}{number}"
         scene.add(*_vehicle(rng, name, model, drive.course, (middle,), t, turn, (0.0,)))
         number += 1
+
+
+def add_waiting(
+    rng: np.random.Generator,
+    scene: Assembly,
+    course: Course,
+    fleet: Fleet,
+    t_m: float,
+    front_m: float,
+    name: str,
+) -> None:
+    """A car that waits at the mouth of a side street, its front at s = `front_m`; `name` is two words."""
+    model = choose(rng, fleet.cars)
+    scene.add(*_vehicle(rng, name, model, course, (front_m + model.length / 2,), t_m, 180.0, (0.0,)))
