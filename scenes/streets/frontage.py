@@ -193,7 +193,7 @@ def _sample_style(
         ("trim", HouseTrim(design), scene.material(street_materials.trim(rng))),
         ("roof", HouseRoof(design), scene.material(street_materials.roof(rng))),
     ]
-    if design.shop and chance(rng, shares.transparent):
+    if design.shop and not design.sides and chance(rng, shares.transparent):
         parts += _open_shop(rng, scene, design, lit)
     else:
         ground = scene.material(street_materials.shop_window(rng, lit)) if design.shop else upper

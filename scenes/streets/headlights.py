@@ -16,7 +16,8 @@ from scenes.streets.rig import Drive
 BEAMS = 4
 """How many vehicles throw light on the street: the nearest. The others' lamps are only seen."""
 _FARTHEST_M = 70.0
-_SPREAD_DEG = 120.0
+_SPREAD_DEG = 64.0
+"""Aimed a little above the road, so that the beam fades towards the bumper, as a head lamp's does."""
 
 
 def beams(
@@ -51,9 +52,9 @@ def _beam(rng: np.random.Generator, carrier: Trajectory) -> AreaLight:
     color: Color = (1.0 + 0.12 * warmth, 0.97, 0.95 - 0.3 * warmth)
     return AreaLight(
         position_m=(0.3, 0.0, 0.0),
-        target_m=(20.0, 0.0, -0.3),
+        target_m=(20.0, 0.0, 1.0),
         color=color,
-        power_w=uniform(rng, 70.0, 200.0),
+        power_w=uniform(rng, 40.0, 120.0),
         size_m=0.22,
         spread_deg=_SPREAD_DEG,
         motion=carrier,
