@@ -114,11 +114,14 @@ class Material:
     finish: Texture | None = field(default=None, metadata=OMIT_DEFAULT)
     """A picture of numbers over the same texture coordinates, as in glTF: green is the roughness and blue the metallic
     share. `roughness` and `metallic` are then what is usual on the surface."""
+    coat: float = field(default=0.0, metadata=OMIT_DEFAULT)
+    """Share of the surface that a smooth clear coat covers, whatever is below it: car paint."""
 
     @property
     def is_reflective(self) -> bool:
-        """Whether it shows what is around or behind it: a metal, glass, or a gloss."""
-        return self.metallic > 0 or self.transmission > 0 or (self.specular > 0 and self.roughness <= GLOSSY)
+        """Whether it shows what is around or behind it: a metal, glass, a clear coat, or a gloss."""
+        gloss = self.specular > 0 and self.roughness <= GLOSSY
+        return self.metallic > 0 or self.transmission > 0 or self.coat > 0 or gloss
 
 
 @lru_cache(maxsize=512)
@@ -367,6 +370,10 @@ class AreaLight:
     """Emitted power, watts."""
     size_m: float
     """Side of the square."""
+    spread_deg: float = field(default=180.0, metadata=OMIT_DEFAULT)
+    """Angle of the cone that it shines into, with the same power: 180 for a bare lamp, less for a head lamp."""
+    motion: Trajectory | None = field(default=None, metadata=OMIT_DEFAULT)
+    """What carries the lamp: position and target are in the coordinates of the carrier. None for a fixed lamp."""
 
 
 Light = SunLight | AreaLight
@@ -389,6 +396,20 @@ class Fog:
     color: Color
     """Colour of infinitely deep fog in the image, linear RGB, 0..1 (after exposure)."""
     visibility_m: float
+
+
+@dataclass(frozen=True)
+class Rain:
+    """Falling drops, which are streaks while the shutter is open. Each has its place, so both views show it there."""
+
+    drops_per_m3: float
+    """How many there are of those large enough to be seen."""
+    streak_m: Vector
+    """How far a drop falls while the shutter is open (world)."""
+    diameter_m: float
+    """How wide a streak is."""
+    opacity: float
+    """Share of the light from behind that a streak of at least a pixel's width hides, 0..1."""
 
 
 @dataclass(frozen=True)
@@ -436,6 +457,8 @@ class FinalPass:
     """The right view's colour balance relative to the left's: a gain for each RGB channel."""
     imperfections: Imperfections = field(default_factory=Imperfections, metadata=OMIT_DEFAULT)
     """Residual errors of the rig, and differences between its cameras."""
+    rain: Rain | None = field(default=None, metadata=OMIT_DEFAULT)
+    """Drops in the air. Ground truth is of what is behind them."""
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,8 @@ class BuiltWorld:
     """One camera, moved from view to view."""
     objects: tuple[bpy.types.Object, ...]
     """In the order of `Scene.objects`."""
+    lamps: tuple[bpy.types.Object, ...]
+    """In the order of `Scene.lights`."""
     deformed_at: dict[int, float] = field(default_factory=dict)
     """The instant whose vertices an object's mesh has, by the object's index."""
 
@@ -43,11 +45,10 @@ def build_world(geometry: SceneGeometry, blender_scene: bpy.types.Scene) -> Buil
     worn = sorted({material for thing in scene.objects for material in thing.materials})
     materials = {k: build_material(f"material_{k}", scene.materials[k]) for k in worn}
     objects = _build_objects(geometry, materials, blender_scene)
-    for index, light in enumerate(scene.lights):
-        _build_light(index, light, blender_scene)
+    lamps = tuple(_build_light(index, light, blender_scene) for index, light in enumerate(scene.lights))
     _build_environment(scene.world, blender_scene)
     camera = _build_camera(scene.camera, blender_scene)
-    return BuiltWorld(scene, geometry, blender_scene, camera, objects)
+    return BuiltWorld(scene, geometry, blender_scene, camera, objects, lamps)
 
 
 def place(world: BuiltWorld, view: str, time_frames: float) -> None:
@@ -62,6 +63,10 @@ def place(world: BuiltWorld, view: str, time_frames: float) -> None:
         if thing.deformation is not None and world.deformed_at.get(index) != time_frames:
             world.deformed_at[index] = time_frames
             _move_vertices(block.data, world.geometry.local_vertices(index, time_frames))
+    for light, block in zip(world.scene.lights, world.lamps, strict=True):
+        if isinstance(light, AreaLight) and light.motion is not None:
+            carrier = Matrix(light.motion.pose(time_frames).tolist())
+            block.matrix_world = carrier @ _aimed(light.position_m, light.target_m)
     camera = world.scene.camera
     pose = camera.pose(view, time_frames)
     world.camera.matrix_world = Matrix(pose.tolist())
@@ -130,26 +135,32 @@ def _move_vertices(mesh: bpy.types.Mesh, vertices: NDArray[np.float64]) -> None:
     mesh.update()  # Blender's normals and Cycles' persistent copy follow only when told.
 
 
-def _build_light(index: int, light: Light, blender_scene: bpy.types.Scene) -> None:
+def _build_light(index: int, light: Light, blender_scene: bpy.types.Scene) -> bpy.types.Object:
     if isinstance(light, SunLight):
         lamp = bpy.data.lights.new(f"sun_{index}", "SUN")
         lamp.energy = light.irradiance
         lamp.angle = np.deg2rad(light.angle_deg)
-        position, direction = Vector((0, 0, 0)), Vector(light.direction)
+        pose = _aimed((0.0, 0.0, 0.0), light.direction)
     else:
         assert isinstance(light, AreaLight)
         lamp = bpy.data.lights.new(f"area_{index}", "AREA")
         lamp.energy = light.power_w
         lamp.size = light.size_m
-        position = Vector(light.position_m)
-        direction = Vector(light.target_m) - position
+        lamp.spread = np.deg2rad(light.spread_deg)
+        pose = _aimed(light.position_m, light.target_m)
     lamp.color = light.color
     block = bpy.data.objects.new(lamp.name, lamp)
-    block.location = position
-    block.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
+    block.matrix_world = pose
     # Cycles would show the lamp's own glowing square to a camera that happens to look at it.
     block.visible_camera = False
     blender_scene.collection.objects.link(block)
+    return block
+
+
+def _aimed(position_m: tuple[float, float, float], target_m: tuple[float, float, float]) -> Matrix:
+    """The pose of a lamp that shines from a position towards a target."""
+    turn = (Vector(target_m) - Vector(position_m)).to_track_quat("-Z", "Y")
+    return Matrix.LocRotScale(Vector(position_m), turn, None)
 
 
 def _build_environment(world: World, blender_scene: bpy.types.Scene) -> None:

@@ -69,7 +69,8 @@ def _sheet(
 ) -> bpy.types.NodeSocket:
     """The shader of a thin sheet: light passes straight on, but for what is reflected or not transmitted.
 
-    Light from lamps passes too, which a refracting pane would stop where there are no caustics.
+    Light from lamps passes too, which a refracting pane would stop where there are no caustics. Only the outer faces
+    reflect: from within, as out of dense glass, a sheet would be a mirror at most angles.
     """
     clear, glossy = tree.nodes.new("ShaderNodeBsdfTransparent"), tree.nodes.new("ShaderNodeBsdfGlossy")
     glossy.inputs["Roughness"].default_value = material.roughness
@@ -77,14 +78,21 @@ def _sheet(
     opaque.inputs[0].default_value = material.transmission
     tree.links.new(surface, opaque.inputs[1])
     tree.links.new(clear.outputs[0], opaque.inputs[2])
-    tree.links.new(tree.nodes.new("ShaderNodeFresnel").outputs[0], mirrored.inputs[0])
+    inside, share = (
+        tree.nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"],
+        tree.nodes.new("ShaderNodeMix"),
+    )
+    share.inputs["B"].default_value = 0.0
+    tree.links.new(inside, share.inputs["Factor"])
+    tree.links.new(tree.nodes.new("ShaderNodeFresnel").outputs[0], share.inputs["A"])
+    tree.links.new(share.outputs["Result"], mirrored.inputs[0])
     tree.links.new(opaque.outputs[0], mirrored.inputs[1])
     tree.links.new(glossy.outputs[0], mirrored.inputs[2])
     return mirrored.outputs[0]
 
 
 def _surface_node(nodes: bpy.types.Nodes, material: Material) -> bpy.types.ShaderNode:
-    shiny = material.specular > 0 or material.metallic > 0 or material.transmission > 0
+    shiny = max(material.specular, material.metallic, material.transmission, material.coat) > 0
     shiny = shiny or material.finish is not None
     shiny = shiny and not material.thin
     if not shiny and material.emission == 0:
@@ -95,4 +103,5 @@ def _surface_node(nodes: bpy.types.Nodes, material: Material) -> bpy.types.Shade
     surface.inputs["Metallic"].default_value = material.metallic
     surface.inputs["Transmission Weight"].default_value = material.transmission
     surface.inputs["Emission Strength"].default_value = material.emission
+    surface.inputs["Coat Weight"].default_value = material.coat
     return surface

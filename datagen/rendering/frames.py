@@ -18,6 +18,7 @@ from datagen.ground_truth.raycast import Hits, SceneRayCaster
 from datagen.ground_truth.scene_geometry import build_geometry
 from datagen.ground_truth.targets import ExtraTargets
 from datagen.rendering.exposure import automatic_exposure, develop
+from datagen.rendering.rain import with_streaks
 from datagen.rendering.sensor import Sensor
 from scenes import Scene
 from stereoforge_kit.errors import UserError
@@ -129,18 +130,24 @@ def render_frames(
             if exposure is None:  # One exposure for a scene: a camera does not flicker.
                 exposure = automatic_exposure(radiances["left"], scene.exposure_key)
             images = {view: {"clean": develop(radiance, exposure)} for view, radiance in radiances.items()}
+            with watch.step("ground_truth"):
+                hits = {view: caster.cast_all(view, frame) for view in VIEWS}
             if "final" in options.passes:
                 with watch.step("render_final"), quiet(log):
                     for view, radiance in render_final(world, frame, exposure, scratch).items():
+                        if scene.final.rain is not None:
+                            drops, truth = scene.final.rain, hits[view].disparity
+                            radiance = with_streaks(
+                                radiance, drops, scene.camera, truth, view, frame, sensor.seed
+                            )
                         light = sensor.expose(sensor.project(radiance, view), exposure, view, frame)
                         images[view]["final"] = sensor.store(develop(light, 1.0))
             with watch.step("ground_truth"):
                 targets = {}
                 for view in VIEWS:
-                    hits = caster.cast_all(view, frame)
                     chosen = {name: images[view][name] for name in options.passes}
-                    extra = extra_targets.make(view, frame, hits)
-                    targets[view] = _targets(chosen, hits, options.gradient_threshold_px, extra)
+                    extra = extra_targets.make(view, frame, hits[view])
+                    targets[view] = _targets(chosen, hits[view], options.gradient_threshold_px, extra)
             yield frame, targets
     except RuntimeError as error:
         tail = " | ".join(log.read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:])

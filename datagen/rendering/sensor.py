@@ -30,7 +30,8 @@ class Sensor:
         self._scene, self._final = scene, scene.final
 
     @cached_property
-    def _seed(self) -> int:
+    def seed(self) -> int:
+        """A number that the Scene record fixes."""
         digest = hashlib.sha256(scene_to_json(self._scene).encode()).digest()
         return int.from_bytes(digest[:8], "big")
 
@@ -73,7 +74,7 @@ class Sensor:
             light = light * np.array(self._final.right_view_color, np.float32)
         variance = self._noise_variance(np.clip(light, 0.0, 1.0), view)
         if variance is not None:
-            rng = np.random.default_rng((self._seed, frame, VIEWS.index(view)))
+            rng = np.random.default_rng((self.seed, frame, VIEWS.index(view)))
             light = light + np.sqrt(variance) * rng.standard_normal(light.shape, np.float32)
         return light.astype(np.float32)
 

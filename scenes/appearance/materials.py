@@ -18,6 +18,20 @@ FinishKind = Literal["dull", "glossy", "metallic", "transparent"]
 
 
 @dataclass(frozen=True)
+class Shares:
+    """How often surfaces that come both ways are of one kind, 0..1 each."""
+
+    plain: float
+    """Of one colour instead of patterned: walls, floors, cloth, fronts."""
+    glossy: float
+    """Varnished, lacquered, glazed or polished instead of matte."""
+    metallic: float
+    """Bare metal instead of painted."""
+    transparent: float
+    """Clear glass instead of coloured, opaque one."""
+
+
+@dataclass(frozen=True)
 class Finish:
     """A kind of surface: ranges of the principled BSDF's scalars."""
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from scenes.appearance.materials import plain, sample_texture, tiled
+from scenes.appearance.materials import Shares, plain, sample_texture, tiled
 from scenes.appearance.painting import Palette, Srgb, sample_palette, shade
 from scenes.appearance.palettes import BARK, CLOTH, EARTH, FOLIAGE, HAIR, PaletteRange, sample_palette_in
 from scenes.random_draws import chance, choose, log_uniform, new_seed, uniform
@@ -27,20 +27,6 @@ from scenes.textures.plain import NearTextureless
 from scenes.textures.tiles import Bricks, Checkers, Dots, Plaid, Stripes, Weave
 
 GREYS = PaletteRange((40.0, 270.0), (0.002, 0.02), (0.25, 0.9))
-
-
-@dataclass(frozen=True)
-class Shares:
-    """How often surfaces that come both ways are of one kind, 0..1 each."""
-
-    plain: float
-    """Of one colour instead of patterned: walls, floors, cloth, fronts."""
-    glossy: float
-    """Varnished, lacquered, glazed or polished instead of matte."""
-    metallic: float
-    """Bare metal instead of painted."""
-    transparent: float
-    """Clear glass instead of coloured, opaque one."""
 
 
 def _wood_palette(rng: np.random.Generator, count: int) -> Palette:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenes.appearance.materials import plain, tiled
+from scenes.appearance.materials import Shares, plain, tiled
 from scenes.appearance.painting import Srgb, sample_palette, shade
 from scenes.random_draws import chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.spec import Material, Texture
@@ -14,9 +14,10 @@ from scenes.textures.collages import BlurredShapes, DeadLeaves, Facade, GlyphRow
 from scenes.textures.foliage import Bark, Foliage, Grass
 from scenes.textures.houses import Plaster, RoofTiles, WindowPanes
 from scenes.textures.layers import Layered
+from scenes.textures.natural import Hair
 from scenes.textures.noise import WoodPlanks
 from scenes.textures.plain import NearTextureless
-from scenes.textures.streets import Asphalt, Paving, RoadMarkingPaint, RoadSign, WheelFace
+from scenes.textures.streets import Asphalt, Paving, RoadMarkingPaint, RoadSign
 from scenes.textures.tiles import Bricks, Plaid, Stripes
 
 WINDOW_FRAMES: tuple[Srgb, ...] = (
@@ -68,9 +69,11 @@ def road_paint(rng: np.random.Generator, yellow: bool = False) -> Material:
     return tiled(replace(paint, color=shade(0.8, 0.15, 88.0)) if yellow else paint, 2.2)
 
 
-def wall(rng: np.random.Generator, plastered: float) -> Material:
-    """Brick or plaster; `plastered` is the share of plaster."""
+def wall(rng: np.random.Generator, plastered: float, shares: Shares) -> Material:
+    """Brick, plaster, or smooth paint; `plastered` is the share of all but brick."""
     if chance(rng, plastered):
+        if chance(rng, 0.5 * shares.plain):
+            return smooth_wall(rng)
         return tiled(Plaster.sample(rng, 256), uniform(rng, 2.5, 4.0))
     hue, chroma, base = choose(
         rng, [(32.0, 0.09, 0.48), (38.0, 0.06, 0.42), (70.0, 0.05, 0.68), (25.0, 0.1, 0.4), (80.0, 0.02, 0.6)]
@@ -94,6 +97,15 @@ def wall(rng: np.random.Generator, plastered: float) -> Material:
         0.08,
     )
     return tiled(bricks, rows * uniform(rng, 0.073, 0.088))
+
+
+def smooth_wall(rng: np.random.Generator) -> Material:
+    """A wall of one colour: painted, rendered, or of smooth concrete."""
+    hue = choose(rng, [75.0, 85.0, 60.0, 40.0, 150.0, 240.0])
+    color = shade(uniform(rng, 0.5, 0.93), uniform(rng, 0.0, 0.06), hue)
+    return tiled(
+        NearTextureless(128, new_seed(rng), color, uniform(rng, 0.005, 0.03), 0.004), uniform(rng, 3.0, 6.0)
+    )
 
 
 def trim(rng: np.random.Generator) -> Material:
@@ -123,17 +135,29 @@ def windows(
     panes = replace(WindowPanes.sample(rng, 320), opening=opening, sill=sill, frame=frame, lit=lit)
     material = tiled(panes, WindowPanes.CELLS * cell_m)
     if lit:
-        return replace(material, emission=0.25, specular=0.3, roughness=0.3)
+        return replace(material, emission=uniform(rng, 0.15, 0.3), specular=0.4, roughness=0.15)
     return replace(material, specular=uniform(rng, 0.5, 0.9), roughness=uniform(rng, 0.02, 0.12))
 
 
 def shop_window(rng: np.random.Generator, lit: float) -> Material:
-    """Goods behind glass; glowing where `lit` is above 0."""
-    kinds: list[type[Texture]] = [DeadLeaves, BlurredShapes, Layered]
-    goods = tiled(choose(rng, kinds).sample(rng, 128), uniform(rng, 2.0, 4.0))
-    if lit:
-        return replace(goods, emission=uniform(rng, 0.3, 0.8), specular=0.3, roughness=0.3)
+    """Posters and goods right behind glass; glowing where `lit` is above 0."""
+    goods = replace(shop_goods(rng, lit), emission=uniform(rng, 0.2, 0.45) if lit else 0.0)
     return replace(goods, specular=0.6, roughness=0.05)
+
+
+def shop_goods(rng: np.random.Generator, lit: float) -> Material:
+    """What is on show, of many colours, in the light of the shop's own lamps."""
+    kinds: list[type[Texture]] = [DeadLeaves, BlurredShapes, Layered]
+    goods = tiled(choose(rng, kinds).sample(rng, 128), uniform(rng, 1.2, 3.0))
+    return replace(goods, emission=uniform(rng, 0.25, 0.6) if lit else uniform(rng, 0.05, 0.2))
+
+
+def shop_room(rng: np.random.Generator, lit: float) -> Material:
+    """The walls of a shop: light paint, paper, boards."""
+    color = shade(uniform(rng, 0.5, 0.95), uniform(rng, 0.0, 0.06), uniform(rng, 30.0, 250.0))
+    paint = NearTextureless(64, new_seed(rng), color, 0.05, 0.02)
+    room = wood(rng) if chance(rng, 0.3) else tiled(paint, 2.0)
+    return replace(room, emission=uniform(rng, 0.15, 0.5) if lit else uniform(rng, 0.04, 0.15))
 
 
 def shop_board(rng: np.random.Generator) -> Material:
@@ -160,29 +184,6 @@ def skyline(rng: np.random.Generator) -> Material:
     return tiled(facade, facade.floors * 3.2)
 
 
-def car_paint(rng: np.random.Generator) -> Material:
-    """The paint of a vehicle: half of them white, grey or black, the others of any colour."""
-    lightness = uniform(rng, 0.18, 0.96)
-    vivid = chance(rng, 0.5)
-    hue = choose(rng, [28.0, 255.0, 250.0, 140.0, 90.0, 60.0, 200.0]) + uniform(rng, -12.0, 12.0)
-    color = shade(
-        min(lightness, 0.75) if vivid else lightness, uniform(rng, 0.06, 0.2) if vivid else 0.008, hue
-    )
-    return plain(
-        color,
-        roughness=uniform(rng, 0.12, 0.35),
-        specular=uniform(rng, 0.5, 0.8),
-        metallic=0.3 * (rng.random() < 0.4),
-    )
-
-
-def car_glass(rng: np.random.Generator) -> Material:
-    """The dark windows of vehicles."""
-    return plain(
-        shade(uniform(rng, 0.16, 0.3), 0.02, uniform(rng, 160.0, 260.0)), roughness=0.03, specular=0.9
-    )
-
-
 def black_plastic() -> Material:
     """Bumpers, grilles and the housings of traffic lights."""
     return plain((26, 26, 28), roughness=0.6, specular=0.3)
@@ -191,23 +192,6 @@ def black_plastic() -> Material:
 def lamp(color: Srgb, lit: float) -> Material:
     """The glass of a lamp: shiny, with the emission `lit`."""
     return replace(plain(color, roughness=0.15, specular=0.6), emission=lit)
-
-
-def wheel(rng: np.random.Generator, radius_m: float, width_m: float) -> Material:
-    """The side of a wheel of a radius and a width in metres, unrolled onto its tread."""
-    face = WheelFace.sample(rng, 128)
-    # The picture is as wide as the wheel with its tread unrolled.
-    side_m = 2.02 * (radius_m + 0.5 * width_m)
-    return tiled(replace(face, rim=0.97 * 0.66 * 2 * radius_m / side_m), side_m)
-
-
-def lettering(rng: np.random.Generator, color: Srgb) -> Material:
-    """The side of a lorry's box or of a bus: a colour with large words on it."""
-    glyphs = replace(GlyphRows.sample(rng, 256), lines=4, letters=integer(rng, 7, 9), grain=0.015)
-    ink = shade(0.3, 0.12, uniform(rng, 0.0, 360.0)) if sum(color) > 380 else shade(0.92, 0.02, 90.0)
-    return replace(
-        tiled(replace(glyphs, palette=(color, ink)), uniform(rng, 2.6, 3.4)), specular=0.4, roughness=0.4
-    )
 
 
 def foliage(rng: np.random.Generator) -> Material:
@@ -220,17 +204,21 @@ def bark(rng: np.random.Generator) -> Material:
     return tiled(Bark.sample(rng, 128), 0.8)
 
 
-def metal_paint(rng: np.random.Generator) -> Material:
-    """Painted metal: posts, bins, railings."""
+def metal(rng: np.random.Generator, shares: Shares) -> Material:
+    """Painted or bare metal: posts, bins, railings."""
+    if chance(rng, shares.metallic):
+        bare = shade(uniform(rng, 0.55, 0.75), 0.006, 250.0)
+        dull = NearTextureless(64, new_seed(rng), bare, 0.08, 0.05)
+        return replace(tiled(dull, 0.5), roughness=uniform(rng, 0.3, 0.55), metallic=1.0)
     color = shade(uniform(rng, 0.2, 0.75), uniform(rng, 0.0, 0.05), choose(rng, [150.0, 250.0, 90.0]))
     return tiled(NearTextureless(64, new_seed(rng), color, 0.06, 0.04), 0.8)
 
 
-def fence(rng: np.random.Generator, kind: str) -> Material:
+def fence(rng: np.random.Generator, kind: str, shares: Shares) -> Material:
     """For a style of `scenes.shapes.street.boundaries.Fence`."""
     if kind == "wall":
-        return wall(rng, 0.3)
-    return wood(rng) if kind in ("boards", "picket") and chance(rng, 0.6) else metal_paint(rng)
+        return smooth_wall(rng) if chance(rng, shares.plain) else wall(rng, 0.3, shares)
+    return wood(rng) if kind in ("boards", "picket") and chance(rng, 0.6) else metal(rng, shares)
 
 
 def wood(rng: np.random.Generator) -> Material:
@@ -240,13 +228,15 @@ def wood(rng: np.random.Generator) -> Material:
     return tiled(replace(WoodPlanks.sample(rng, 128), palette=palette, planks=4), 0.9)
 
 
-def cloth(rng: np.random.Generator) -> Material:
-    """Clothes: mostly plain and muted, some striped or checked."""
+def cloth(rng: np.random.Generator, shares: Shares) -> Material:
+    """Clothes: mostly muted; plain, mottled, striped or checked."""
     kind = rng.random()
-    if kind < 0.7:
-        color = shade(uniform(rng, 0.2, 0.85), log_uniform(rng, 0.01, 0.16), uniform(rng, 0.0, 360.0))
+    if kind < 0.75:
+        color = shade(uniform(rng, 0.2, 0.85), log_uniform(rng, 0.01, 0.12), uniform(rng, 0.0, 360.0))
+        if chance(rng, shares.plain):
+            return plain(color)
         return tiled(NearTextureless(64, new_seed(rng), color, 0.1, 0.08), 0.35)
-    if kind < 0.85:
+    if kind < 0.88:
         return tiled(replace(Stripes.sample(rng, 64), palette=sample_palette(rng, 4)), 0.25)
     return tiled(replace(Plaid.sample(rng, 64), palette=sample_palette(rng, 4)), 0.25)
 
@@ -257,20 +247,25 @@ def skin(rng: np.random.Generator) -> Material:
     return plain(shade(lightness, 0.06, 55.0), roughness=0.7, specular=0.2)
 
 
+def features() -> Material:
+    """Eyes, brows and mouths."""
+    return plain(shade(0.27, 0.04, 30.0))
+
+
+def leather(rng: np.random.Generator) -> Material:
+    """Shoes, bags and hats."""
+    color = shade(uniform(rng, 0.15, 0.6), log_uniform(rng, 0.005, 0.1), uniform(rng, 20.0, 300.0))
+    return plain(color, roughness=uniform(rng, 0.4, 0.8), specular=0.3)
+
+
 def hair(rng: np.random.Generator) -> Material:
-    """Human hair, or a cap."""
-    return plain(
-        choose(
-            rng,
-            [
-                shade(0.2, 0.02, 60.0),
-                shade(0.32, 0.05, 60.0),
-                shade(0.65, 0.08, 80.0),
-                shade(0.75, 0.01, 90.0),
-                shade(0.45, 0.12, 40.0),
-            ],
-        )
+    """Human hair in strands of dark and light."""
+    middle, chroma, hue = choose(
+        rng,
+        [(0.2, 0.02, 60.0), (0.32, 0.05, 60.0), (0.65, 0.08, 80.0), (0.75, 0.01, 90.0), (0.42, 0.1, 42.0)],
     )
+    palette = tuple(shade(max(0.1, middle + step), chroma, hue) for step in (-0.1, -0.04, 0.03, 0.1))
+    return tiled(replace(Hair.of(rng, 64, palette, palette[0]), pattern="none"), 0.12)
 
 
 def sign_face(rng: np.random.Generator, corners: int) -> Material:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.appearance.materials import sample_material
-from scenes.appearance.room_materials import RoomMaterials, Shares
+from scenes.appearance.materials import Shares, sample_material
+from scenes.appearance.room_materials import RoomMaterials
 from scenes.family import Family
 from scenes.motion.trajectories import vector, wander
 from scenes.placement.assembly import ObjectGroup

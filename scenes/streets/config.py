@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from scenes.appearance.materials import Shares
 from scenes.family import FamilyConfig
 from scenes.random_draws import Count, Range
 from stereoforge_kit.errors import InputError
@@ -49,6 +50,8 @@ class DrivingConfig(FamilyConfig):
     """How many streets are straight."""
     bend_deg: Range = (6.0, 32.0)
     """How much a winding street may turn within 50 m."""
+    junction_share: float = 0.35
+    """How many streets have a side street in view, or one on either side."""
     view_m: Range = (100.0, 170.0)
     """Length of the street before the camera."""
     lanes: Count = (1, 2)
@@ -73,10 +76,41 @@ class DrivingConfig(FamilyConfig):
     """Distance between the lamp posts of a row."""
     furniture_per_100m: Range = (2.0, 16.0)
     """Signs, bins, bollards, benches, cabinets, shelters on each pavement."""
-    dusk_share: float = 0.2
-    """How many scenes are lit by the last of the daylight and by street lamps."""
+    largest_cover_share: float = 0.35
+    """No vehicle covers a larger share of the view than this."""
+    close_wall_share: float = 0.25
+    """How many sides have a wall, a fence or a railing close to the lane along a part of the street."""
+
+    night_share: float = 0.15
+    """How many scenes are lit by street lamps, head lamps, shops and windows alone."""
+    dusk_share: float = 0.12
+    """How many scenes are lit by the last of the daylight and by lamps."""
     overcast_share: float = 0.35
-    """How many of the other scenes have no hard shadows."""
+    """How many of the scenes by day have no hard shadows; those in which it rains all have none."""
+    low_sun_share: float = 0.3
+    """How many of the other scenes by day have a sun low above the horizon."""
+    rain_share: float = 0.18
+    """How many scenes have rain: a wet street, and drops in the final pass."""
+    wet_share: float = 0.1
+    """How many of the other scenes have a street that is still wet."""
+    shutter_frames: Range = (0.2, 0.7)
+    """How long the final pass's shutter is open."""
+
+    plain_share: float = 0.4
+    """How many of the surfaces that come both ways are of one colour: walls close by, the sides of vans and lorries,
+    boards, clothes."""
+    glossy_share: float = 0.75
+    """How many vehicles have a clear coat that reflects; the others are dull or dirty."""
+    metallic_share: float = 0.35
+    """How many paints of vehicles are metallic, and how many posts, railings and bins are bare metal."""
+    transparent_share: float = 0.7
+    """How many windows of cars, shops and shelters are clear glass with something behind; the others are dark or
+    papered over. Ground truth is of the panes."""
+
+    @property
+    def shares(self) -> Shares:
+        """How often surfaces that come both ways are of one kind."""
+        return Shares(self.plain_share, self.glossy_share, self.metallic_share, self.transparent_share)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -88,3 +122,12 @@ class DrivingConfig(FamilyConfig):
             raise InputError(f"driving: focal_lengths_mm must be above 0, got {self.focal_lengths_mm}")
         if self.largest_disparity_share <= 0:
             raise InputError("driving: largest_disparity_share must be above 0")
+        if self.largest_cover_share <= 0:
+            raise InputError("driving: largest_cover_share must be above 0")
+        if self.night_share + self.dusk_share > 1:
+            raise InputError(
+                f"driving: night_share and dusk_share must add up to at most 1, got {self.night_share} and "
+                f"{self.dusk_share}"
+            )
+        if self.shutter_frames[0] < 0:
+            raise InputError(f"driving: shutter_frames must not be negative, got {self.shutter_frames}")

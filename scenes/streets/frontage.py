@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from scenes.appearance import street_materials
-from scenes.placement.assembly import Assembly, anchored_object
-from scenes.random_draws import Range, chance, choose, integer, uniform
+from scenes.appearance import street_materials, vehicle_materials
+from scenes.appearance.materials import Shares
+from scenes.placement.assembly import Assembly
+from scenes.random_draws import Range, chance, choose, integer, new_seed, uniform
 from scenes.shapes.anchored import MetricShape
 from scenes.shapes.street.boundaries import Fence, Hedge
 from scenes.shapes.street.buildings import (
@@ -24,7 +24,9 @@ from scenes.shapes.street.buildings import (
 )
 from scenes.shapes.street.road import Course
 from scenes.shapes.street.roadside_plants import Shrub
-from scenes.streets.along_course import on_course
+from scenes.shapes.street.shops import ShopGoods, ShopPanes, ShopRoom
+from scenes.streets.along_course import add_in_spans, on_course
+from scenes.streets.config import DrivingConfig
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,17 @@ DISTRICTS: dict[str, District] = {
 
 
 @dataclass(frozen=True)
+class Opening:
+    """Where a side street joins."""
+
+    s_m: float
+    """Of its middle."""
+    half_road_m: float
+    half_m: float
+    """Half its width with its pavements."""
+
+
+@dataclass(frozen=True)
 class Side:
     """One side of the street in street coordinates; `sign` is 1 on the left, -1 on the right."""
 
@@ -83,6 +96,24 @@ class Side:
     """Distance of the house fronts."""
     parking: bool
     """Whether a parking lane runs along the kerb."""
+    name: str
+    """What its things are told apart by: L, R; for side streets more letters."""
+    openings: tuple[Opening, ...] = ()
+
+    def is_open(self, s_m: float, reach_m: float) -> bool:
+        """Whether what reaches `reach_m` to both sides of s would stand in the mouth of a side street."""
+        return any(abs(s_m - opening.s_m) < opening.half_m + reach_m for opening in self.openings)
+
+    def stretches(self, start_m: float, end_m: float, *, of_kerb: bool = False) -> list[tuple[float, float]]:
+        """From and to s of what lies between the openings, up to the road for kerbs, else up to the pavements."""
+        edges = [start_m]
+        for opening in self.openings:
+            half = opening.half_road_m if of_kerb else opening.half_m
+            edges += [opening.s_m - half, opening.s_m + half]
+        edges.append(end_m)
+        pieces = zip(edges[::2], edges[1::2], strict=True)
+        within = [(max(low, start_m), min(high, end_m)) for low, high in pieces]
+        return [(low, high) for low, high in within if high > low]
 
     def turn_deg(self) -> float:
         """Rotation at which a thing's y axis points away from the street, degrees."""
@@ -99,16 +130,23 @@ class _Style:
 
 
 def add_houses(
-    rng: np.random.Generator, scene: Assembly, course: Course, side: Side, start_m: float, lit: float
+    rng: np.random.Generator,
+    scene: Assembly,
+    config: DrivingConfig,
+    course: Course,
+    side: Side,
+    start_m: float,
+    lit: float,
 ) -> None:
     """A row of houses along one side, of a few designs, each house with its own wall."""
     district = side.district
     if not district.houses:
         return
     walls = [
-        scene.material(street_materials.wall(rng, district.plastered)) for _ in range(integer(rng, 2, 3))
+        scene.material(street_materials.wall(rng, district.plastered, config.shares))
+        for _ in range(integer(rng, 2, 3))
     ]
-    styles = [_sample_style(rng, scene, district, lit) for _ in range(integer(rng, 2, 3))]
+    styles = [_sample_style(rng, scene, config.shares, district, lit) for _ in range(integer(rng, 2, 3))]
     gap_m = uniform(rng, *district.gap_m)
     s, number = start_m + uniform(rng, 0.0, 8.0), 0
     while True:
@@ -116,9 +154,12 @@ def add_houses(
         step_m, back_m = _room_for(course, side, s, style.design)
         if s + step_m > course.end_m - 4.0:
             return
+        if side.is_open(s + step_m / 2, step_m / 2):
+            s = max(opening.s_m + opening.half_m for opening in side.openings) + 0.05
+            continue
         _add_house(
             scene,
-            f"house {'LR'[side.sign < 0]}{number}",
+            f"house {side.name}{number}",
             style,
             choose(rng, walls),
             course,
@@ -141,23 +182,46 @@ def _room_for(course: Course, side: Side, s_m: float, design: HouseDesign) -> tu
     return step_m, float(np.abs(curvature).max()) * design.width**2 / 8
 
 
-def _sample_style(rng: np.random.Generator, scene: Assembly, district: District, lit: float) -> _Style:
+def _sample_style(
+    rng: np.random.Generator, scene: Assembly, shares: Shares, district: District, lit: float
+) -> _Style:
     design = HouseDesign.sample(rng, choose(rng, district.houses))
     frame = choose(rng, street_materials.WINDOW_FRAMES)
     windows = street_materials.windows(rng, design.opening, design.sill, NOMINAL_BAY_M, frame, lit)
     upper = scene.material(windows)
-    ground = scene.material(street_materials.shop_window(rng, lit)) if design.shop else upper
     parts: list[tuple[str, MetricShape, int]] = [
         ("trim", HouseTrim(design), scene.material(street_materials.trim(rng))),
-        ("ground floor windows", HouseWindows(design, ground=True), ground),
         ("roof", HouseRoof(design), scene.material(street_materials.roof(rng))),
     ]
+    if design.shop and not design.sides and chance(rng, shares.transparent):
+        parts += _open_shop(rng, scene, design, lit)
+    else:
+        ground = scene.material(street_materials.shop_window(rng, lit)) if design.shop else upper
+        parts.append(("ground floor windows", HouseWindows(design, ground=True), ground))
     if design.floors > 1:
         parts.append(("windows", HouseWindows(design, ground=False), upper))
     if design.shop:
         front = replace(ShopFront.sample(rng), width=design.width, height=design.ground_floor - 0.72)
         parts.append(("shop front", front, scene.material(street_materials.shop_board(rng))))
     return _Style(design, HouseWalls(design), tuple(parts))
+
+
+def _open_shop(
+    rng: np.random.Generator, scene: Assembly, design: HouseDesign, lit: float
+) -> list[tuple[str, MetricShape, int]]:
+    """Shops that one sees into: panes, rooms, goods."""
+    return [
+        ("panes", ShopPanes(design), scene.material(vehicle_materials.clear_glass(rng))),
+        ("shop", ShopRoom(design, integer(rng, 1, 3)), scene.material(street_materials.shop_room(rng, lit))),
+        *(
+            (
+                f"goods {kind}",
+                ShopGoods(design, new_seed(rng)),
+                scene.material(street_materials.shop_goods(rng, lit)),
+            )
+            for kind in range(2)
+        ),
+    ]
 
 
 def _add_house(
@@ -182,23 +246,30 @@ def _add_house(
 
 
 def add_boundary(
-    rng: np.random.Generator, scene: Assembly, course: Course, side: Side, start_m: float, end_m: float
+    rng: np.random.Generator,
+    scene: Assembly,
+    config: DrivingConfig,
+    course: Course,
+    side: Side,
+    start_m: float,
+    end_m: float,
 ) -> None:
     """Fences, walls or hedges between the pavement and what lies behind, with gaps for gates."""
     if side.front_m - side.edge_m < 1.5 or not side.district.boundary:
         return
     kind = choose(rng, side.district.boundary)
-    shape: MetricShape
+    shape: Fence | Hedge
     if kind == "hedge":
         t = side.sign * (side.edge_m + 0.5)
-        shape = replace(Hedge.sample(rng, course), from_m=start_m, to_m=end_m, t_m=t)
+        shape = replace(Hedge.sample(rng, course), t_m=t)
         material = street_materials.foliage(rng)
     else:
         t = side.sign * (side.edge_m + 0.2)
-        shape = replace(Fence.sample(rng, kind, course), from_m=start_m, to_m=end_m, t_m=t)
-        material = street_materials.fence(rng, kind)
-    name, index = "fence " + "LR"[side.sign < 0], scene.material(material)
-    scene.add(anchored_object(name, shape, index, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
+        shape = replace(Fence.sample(rng, kind, course), t_m=t)
+        material = street_materials.fence(rng, kind, config.shares)
+    index = scene.material(material)
+    for number, (low, high) in enumerate(side.stretches(start_m, end_m)):
+        add_in_spans(scene, f"fence {side.name}{number}", shape, index, low, high)
 
 
 def add_garden(
@@ -213,7 +284,9 @@ def add_garden(
     for number in range(integer(rng, 0, 10)):
         shrub = choose(rng, kinds)
         s, t = uniform(rng, start_m, end_m), side.sign * (side.edge_m + uniform(rng, 1.3, depth - 0.9))
-        name, turn = f"shrub {'LR'[side.sign < 0]}{number}", uniform(rng, 0.0, 360.0)
+        name, turn = f"shrub {side.name}{number}", uniform(rng, 0.0, 360.0)
+        if side.is_open(s, 1.2):
+            continue
         scene.add(*on_course(name, [("", shrub, leaves)], course, s, t, turn_deg=turn))
 
 
@@ -227,6 +300,8 @@ def add_skyline(rng: np.random.Generator, scene: Assembly, course: Course, sides
         side = choose(rng, sides)
         aside = uniform(rng, 0.0, 60.0) if ahead else side.front_m + uniform(rng, 45.0, 140.0)
         block = CityBlock.sample(rng)
+        if side.is_open(s, block.width):
+            continue
         turn, material = uniform(rng, -30.0, 30.0), choose(rng, materials)
         parts = [("", block, material)]
         scene.add(*on_course(f"block {number}", parts, course, s, side.sign * aside, turn_deg=turn))

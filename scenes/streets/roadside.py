@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.appearance import street_materials
+from scenes.appearance import street_materials, vehicle_materials
+from scenes.appearance.materials import Shares
 from scenes.placement.assembly import Assembly, anchored_object
 from scenes.random_draws import chance, choose, integer, uniform
 from scenes.shapes.anchored import MetricShape
@@ -19,13 +20,22 @@ from scenes.shapes.street.furniture import (
     LampLight,
     LampPost,
     LitterBin,
+    ShelterPanes,
     SignFace,
     SignPost,
     StreetCabinet,
     TrafficLight,
     TrafficLightLens,
 )
-from scenes.shapes.street.pedestrians import PersonDesign, PersonHair, PersonLegs, PersonSkin, PersonTop
+from scenes.shapes.street.pedestrians import (
+    PersonDesign,
+    PersonFeatures,
+    PersonHair,
+    PersonLegs,
+    PersonSkin,
+    PersonThings,
+    PersonTop,
+)
 from scenes.shapes.street.roadside_plants import TreeCrown, TreeDesign, TreeStem
 from scenes.spec import AreaLight
 from scenes.streets.along_course import on_course
@@ -51,8 +61,10 @@ class Pavement:
     def take(self, s_m: float, t_m: float, reach_m: float, travel_m: float = 0.0) -> bool:
         """Take a disc of radius `reach_m` at (s, t) if it is free; False if it is not.
 
-        The disc moves by up to `travel_m` along the street either way.
+        The disc moves by up to `travel_m` along the street either way. The mouths of side streets stay free.
         """
+        if self.side.is_open(s_m, reach_m + travel_m):
+            return False
         for s, t, reach, travel in self._taken:
             apart = max(abs(s - s_m) - travel - travel_m, 0.0)
             if math.hypot(apart, t - t_m) < reach + reach_m:
@@ -75,7 +87,7 @@ class Pavement:
 
     def name(self, what: str, number: int) -> str:
         """A name for a thing on this pavement, different on both."""
-        return f"{what} {'LR'[self.side.sign < 0]}{number}"
+        return f"{what} {self.side.name}{number}"
 
 
 def add_lamps(
@@ -89,7 +101,7 @@ def add_lamps(
 ) -> list[AreaLight]:
     """Rows of lamp posts of one design; returns the light of those nearest to the rig when they are lit."""
     design = LampDesign.sample(rng)
-    post = scene.material(street_materials.metal_paint(rng))
+    post = scene.material(street_materials.metal(rng, config.shares))
     glow = uniform(rng, 12.0, 30.0) if lit else 0.0
     glass = scene.material(street_materials.lamp((255, 226, 190) if lit else (225, 226, 220), glow))
     parts: _Parts = [("post", LampPost(design), post), ("light", LampLight(design), glass)]
@@ -100,7 +112,9 @@ def add_lamps(
         s, number = drive.course.start_m + uniform(rng, 2.0, spacing), 0
         while s < drive.course.end_m - 2.0:
             t = pavement.near_kerb(0.5)
-            pavement.take(s, t, 0.4)
+            if not pavement.take(s, t, 0.4):
+                s += 2.0
+                continue
             # The arm's x axis points over the street.
             turn = -90.0 if pavement.side.sign > 0 else 90.0
             scene.add(
@@ -203,7 +217,7 @@ def add_furniture(
 ) -> None:
     """Signs, bollards, bins, benches, cabinets and shelters at random places of a pavement."""
     course = drive.course
-    pieces = _sample_pieces(rng, scene, pavement)
+    pieces = _sample_pieces(rng, scene, config, pavement)
     length = course.end_m - course.start_m
     for number in range(rng.poisson(uniform(rng, *config.furniture_per_100m) * length / 100)):
         piece = choose(rng, pieces, [piece.share for piece in pieces])
@@ -221,9 +235,11 @@ def add_furniture(
                 scene.add(*on_course(name, piece.parts, course, at, t, turn_deg=turn, z_m=ground_m))
 
 
-def _sample_pieces(rng: np.random.Generator, scene: Assembly, pavement: Pavement) -> list[_Piece]:
+def _sample_pieces(
+    rng: np.random.Generator, scene: Assembly, config: DrivingConfig, pavement: Pavement
+) -> list[_Piece]:
     grey, wooden = (
-        scene.material(street_materials.metal_paint(rng)),
+        scene.material(street_materials.metal(rng, config.shares)),
         scene.material(street_materials.wood(rng)),
     )
     facing = pavement.side.turn_deg() + 180.0
@@ -242,7 +258,10 @@ def _sample_pieces(rng: np.random.Generator, scene: Assembly, pavement: Pavement
         pieces.append(_Piece("sign", 0.12, parts, 0.4, from_kerb_m=0.5, turn_deg=180.0))
     if pavement.width_m > 2.6:
         shelter = BusShelter.sample(rng)
-        pieces.append(_Piece("shelter", 0.05, [("", shelter, grey)], 2.4, from_wall_m=0.5, turn_deg=facing))
+        frame: _Parts = [("", shelter, grey)]
+        if chance(rng, config.transparent_share):
+            frame.append(("panes", ShelterPanes(shelter), scene.material(vehicle_materials.clear_glass(rng))))
+        pieces.append(_Piece("shelter", 0.05, frame, 2.4, from_wall_m=0.5, turn_deg=facing))
     return pieces
 
 
@@ -271,7 +290,8 @@ def add_traffic_lights(
             ahead = (pavement.side.sign > 0) == drive.keep_left
             s = crossing + (-2.6 if ahead else 2.6)
             t = pavement.near_kerb(0.45)
-            pavement.take(s, t, 0.3)
+            if not pavement.take(s, t, 0.3):
+                continue
             # Its arm is along y: over the street when the light is turned towards its traffic.
             turn = 180.0 if ahead else 0.0
             over = 1.0 if (turn == 0.0) == (pavement.side.sign < 0) else -1.0
@@ -300,7 +320,7 @@ def add_people(
 ) -> None:
     """People standing and walking along a pavement, each on a track of their own."""
     course = drive.course
-    wardrobe = _Wardrobe(rng, scene)
+    wardrobe = _Wardrobe(rng, scene, config.shares)
     length = course.end_m - course.start_m
     for number in range(rng.poisson(uniform(rng, *config.pedestrians_per_100m) * length / 100)):
         s = uniform(rng, course.start_m + 1.0, course.end_m - 5.0)
@@ -331,19 +351,26 @@ def add_people(
 class _Wardrobe:
     """A few bodies and clothes that the people of a pavement share."""
 
-    def __init__(self, rng: np.random.Generator, scene: Assembly) -> None:
-        designs = [PersonDesign.sample(rng) for _ in range(3)]
-        self.bodies = [(PersonTop(d), PersonLegs(d), PersonSkin(d), PersonHair(d)) for d in designs]
-        self.clothes = [scene.material(street_materials.cloth(rng)) for _ in range(6)]
-        self.skins = [scene.material(street_materials.skin(rng)) for _ in range(2)]
-        self.hairs = [scene.material(street_materials.hair(rng)) for _ in range(2)]
+    def __init__(self, rng: np.random.Generator, scene: Assembly, shares: Shares) -> None:
+        # Shapes keep their meshes, so people of one design share the shapes too.
+        self.bodies = [
+            (PersonTop(d), PersonLegs(d), PersonSkin(d), PersonFeatures(d), PersonHair(d), PersonThings(d))
+            for d in (PersonDesign.sample(rng) for _ in range(3))
+        ]
+        self.clothes = [scene.material(street_materials.cloth(rng, shares)) for _ in range(7)]
+        self.things = [scene.material(street_materials.leather(rng)) for _ in range(3)]
+        self.skins = [scene.material(street_materials.skin(rng)) for _ in range(3)]
+        self.hairs = [scene.material(street_materials.hair(rng)) for _ in range(3)]
+        self.features = scene.material(street_materials.features())
 
     def dressed(self, rng: np.random.Generator) -> _Parts:
-        top, legs, skin, hair = choose(rng, self.bodies)
+        top, legs, skin, features, hair, things = choose(rng, self.bodies)
         above, below = rng.choice(len(self.clothes), 2, replace=False)
         return [
             ("top", top, self.clothes[int(above)]),
             ("legs", legs, self.clothes[int(below)]),
             ("skin", skin, choose(rng, self.skins)),
+            ("features", features, self.features),
             ("hair", hair, choose(rng, self.hairs)),
+            ("things", things, choose(rng, self.things)),
         ]

@@ -9,15 +9,29 @@ from scipy.spatial.transform import Rotation
 
 from scenes.appearance import street_materials
 from scenes.placement.assembly import Assembly, anchored_object
-from scenes.random_draws import chance, integer, uniform
+from scenes.random_draws import chance, integer, new_seed, uniform
 from scenes.shapes.anchored import MetricShape
+from scenes.shapes.street.puddles import Puddles
 from scenes.shapes.street.road import Course, Kerb, LevelGround, RoadMarkings, RoadStrip, Stripe
 from scenes.streets.config import DrivingConfig
 from scenes.streets.frontage import Side
 from scenes.streets.rig import Drive
+from scenes.streets.weather import Weather
 
 _LAND_M = 900.0
 """How far the land reaches around the street."""
+
+
+@dataclass(frozen=True)
+class Surfacing:
+    """What the ground of a neighbourhood is made of: indices of materials, and the kerbs' height."""
+
+    tarmac: int
+    paint: int
+    stone: int
+    paving: int
+    lawn: int
+    kerb_m: float
 
 
 @dataclass(frozen=True)
@@ -28,59 +42,101 @@ class Ground:
     """s of the middles of the zebra crossings."""
     pavement_m: float
     """Height of the pavements above the road's edge."""
+    surfacing: Surfacing
 
 
 def lay_ground(
-    rng: np.random.Generator, scene: Assembly, config: DrivingConfig, drive: Drive, sides: tuple[Side, Side]
+    rng: np.random.Generator,
+    scene: Assembly,
+    config: DrivingConfig,
+    drive: Drive,
+    sides: tuple[Side, Side],
+    weather: Weather,
 ) -> Ground:
     """Add all surfaces of the ground."""
     course = drive.course
     left, right = sides
     road = (left.kerb_m, -right.kerb_m, uniform(rng, 0.0, 0.06))
     kerb_height = uniform(rng, *config.kerb_m)
-    crossings = _crossings(rng)
-    tarmac = scene.material(street_materials.asphalt(rng))
-    _lay(
+    mouths = [opening for side in sides for opening in side.openings]
+    crossings = tuple(
+        s for s in _crossings(rng) if all(abs(s - mouth.s_m) > mouth.half_m + 5.0 for mouth in mouths)
+    )
+    asphalt = street_materials.asphalt(rng)
+    tarmac = scene.material(weather.wetted(asphalt))
+    lay(
         scene,
         "road",
         RoadStrip(course, course.start_m, course.end_m, road[0], road[1], 0.0, 0.4, road[2]),
         tarmac,
     )
-    _paint(rng, scene, drive, road, crossings)
-    _repairs(rng, scene, course, road)
-    stone, paving = (
-        scene.material(street_materials.kerb_stone(rng)),
-        scene.material(street_materials.pavement(rng)),
+    _paint(rng, scene, drive, road, crossings, weather)
+    _repairs(rng, scene, course, road, weather)
+    if weather.wetness > 0.4:
+        _puddles(rng, scene, drive, road, scene.material(weather.standing_water(asphalt)))
+    surfacing = Surfacing(
+        tarmac=tarmac,
+        paint=scene.material(weather.wetted(street_materials.road_paint(rng))),
+        stone=scene.material(weather.wetted(street_materials.kerb_stone(rng))),
+        paving=scene.material(weather.wetted(street_materials.pavement(rng))),
+        lawn=scene.material(street_materials.grass(rng)),
+        kerb_m=kerb_height,
     )
-    lawn = scene.material(street_materials.grass(rng))
     for side in sides:
-        name = "left" if side.sign > 0 else "right"
-        width = uniform(rng, 0.12, 0.3) * side.sign
-        kerb = Kerb(course, course.start_m, course.end_m, side.sign * side.kerb_m, width, kerb_height, 2.0)
-        _lay(scene, f"{name} kerb", kerb, stone)
-        inner, outer = side.sign * (side.kerb_m + abs(width) / 2), side.sign * side.edge_m
-        top = kerb_height - 0.006
-        _lay(scene, f"{name} pavement", _strip(course, inner, outer, top), paving)
-        reach = side.sign * (side.front_m + 22.0)
-        _lay(
-            scene,
-            f"{name} land",
-            _strip(course, outer - 0.05 * side.sign, reach, top - 0.02),
-            _land(rng, side, lawn, paving),
-        )
-    _lay(scene, "plain", LevelGround(course.start_m - _LAND_M, course.end_m + _LAND_M, _LAND_M, -0.3), lawn)
-    return Ground(crossings, kerb_height - 0.006)
+        lay_side(rng, scene, course, side, surfacing)
+    lay(
+        scene,
+        "plain",
+        LevelGround(course.start_m - _LAND_M, course.end_m + _LAND_M, _LAND_M, -0.3),
+        surfacing.lawn,
+    )
+    return Ground(crossings, kerb_height - 0.006, surfacing)
 
 
-def _lay(scene: Assembly, name: str, shape: MetricShape, material: int) -> None:
+def lay(scene: Assembly, name: str, shape: MetricShape, material: int) -> None:
     """A shape whose coordinates are the world's."""
     scene.add(anchored_object(name, shape, material, [(0.0, 0.0, 0.0)], [Rotation.identity()]))
 
 
-def _strip(course: Course, one_m: float, other_m: float, top_m: float) -> RoadStrip:
-    return RoadStrip(
-        course, course.start_m, course.end_m, max(one_m, other_m), min(one_m, other_m), top_m, 0.5
-    )
+def strip(
+    course: Course,
+    one_m: float,
+    other_m: float,
+    top_m: float,
+    from_m: float | None = None,
+    to_m: float | None = None,
+) -> RoadStrip:
+    """A level strip between two distances from a street's middle, along all of it or a part."""
+    start_m, end_m = course.start_m if from_m is None else from_m, course.end_m if to_m is None else to_m
+    return RoadStrip(course, start_m, end_m, max(one_m, other_m), min(one_m, other_m), top_m, 0.5)
+
+
+def lay_side(
+    rng: np.random.Generator,
+    scene: Assembly,
+    course: Course,
+    side: Side,
+    surfacing: Surfacing,
+    land_from_m: float | None = None,
+) -> None:
+    """Kerb, pavement and land of one side; of a side street with its land from a distance on."""
+    name = {"L": "left", "R": "right"}.get(side.name, f"side {side.name}")
+    width = uniform(rng, 0.12, 0.3) * side.sign
+    inner, outer = side.sign * (side.kerb_m + abs(width) / 2), side.sign * side.edge_m
+    reach = side.sign * (side.front_m + 22.0)
+    top = surfacing.kerb_m - 0.006
+    main = land_from_m is None
+    start_m = course.start_m if main else 0.02
+    ground = _land(rng, side, surfacing.lawn, surfacing.paving)
+    for number, (low, high) in enumerate(side.stretches(start_m, course.end_m, of_kerb=True)):
+        kerb = Kerb(course, low, high, side.sign * side.kerb_m, width, surfacing.kerb_m, 2.0)
+        lay(scene, f"{name} kerb {number}", kerb, surfacing.stone)
+    for number, (low, high) in enumerate(side.stretches(start_m, course.end_m)):
+        lay(scene, f"{name} pavement {number}", strip(course, inner, outer, top, low, high), surfacing.paving)
+        # Side streets' land lies below the main street's, which it meets at any angle.
+        level, begin = (top - 0.02, low) if main else (top - 0.035, land_from_m)
+        land = strip(course, outer - 0.05 * side.sign, reach, level, begin, high)
+        lay(scene, f"{name} land {number}", land, ground)
 
 
 def _land(rng: np.random.Generator, side: Side, lawn: int, paving: int) -> int:
@@ -103,6 +159,7 @@ def _paint(
     drive: Drive,
     road: tuple[float, float, float],
     crossings: tuple[float, ...],
+    weather: Weather,
 ) -> None:
     course = drive.course
     half = uniform(rng, 0.05, 0.08)
@@ -125,16 +182,17 @@ def _paint(
     for middle in crossings:
         stripes += _zebra(rng, drive, road, middle)
     yellow = chance(rng, 0.25)
-    white = scene.material(street_materials.road_paint(rng))
+    white = scene.material(weather.wetted(street_materials.road_paint(rng)))
+    middle = scene.material(weather.wetted(street_materials.road_paint(rng, True))) if yellow else white
     centre = [piece for stripe in centre for piece in _interrupted(stripe, crossings)]
     stripes = [piece for stripe in stripes for piece in _interrupted(stripe, crossings)]
     groups = [
-        ("centre line", centre, scene.material(street_materials.road_paint(rng, True)) if yellow else white),
+        ("centre line", centre, middle),
         ("markings", stripes, white),
     ]
     for name, items, material in groups:
         if items:
-            _lay(scene, name, RoadMarkings(course, tuple(items), road), material)
+            lay(scene, name, RoadMarkings(course, tuple(items), road), material)
 
 
 def _dashes(course: Course, t_m: float, half_m: float, dash_m: float, gap_m: float) -> list[Stripe]:
@@ -179,8 +237,26 @@ def _interrupted(stripe: Stripe, crossings: tuple[float, ...]) -> list[Stripe]:
     return pieces
 
 
+def _puddles(
+    rng: np.random.Generator, scene: Assembly, drive: Drive, road: tuple[float, float, float], water: int
+) -> None:
+    """Water that stands along the kerbs, in the outer quarters of the road's camber."""
+    quarter = (road[0] - road[1]) / 4
+    spots = []
+    for _ in range(integer(rng, 3, 14)):
+        wide = uniform(rng, 0.2, 0.42) * min(quarter, 2.4)
+        inwards = uniform(rng, wide + 0.05, quarter - wide)
+        t = road[0] - inwards if chance(rng, 0.5) else road[1] + inwards
+        spots.append((uniform(rng, 3.0, 0.6 * drive.view_m), t, uniform(rng, 0.5, 3.5), wide))
+    lay(scene, "puddles", Puddles(drive.course, tuple(spots), road, new_seed(rng)), water)
+
+
 def _repairs(
-    rng: np.random.Generator, scene: Assembly, course: Course, road: tuple[float, float, float]
+    rng: np.random.Generator,
+    scene: Assembly,
+    course: Course,
+    road: tuple[float, float, float],
+    weather: Weather,
 ) -> None:
     """Patches of newer tarmac, seams and covers; thinner than the road paint, which runs over them."""
     patches = []
@@ -194,4 +270,4 @@ def _repairs(
         patches.append(Stripe(s, s + long, t + wide, t - wide, shear=uniform(rng, -0.2, 0.2)))
     if patches:
         shape = RoadMarkings(course, tuple(patches), road, thickness_m=0.003)
-        _lay(scene, "repairs", shape, scene.material(street_materials.tarmac_patch(rng)))
+        lay(scene, "repairs", shape, scene.material(weather.wetted(street_materials.tarmac_patch(rng))))

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from scenes.appearance import street_materials
-from scenes.appearance.materials import plain
-from scenes.appearance.painting import Srgb, shade
-from scenes.placement.assembly import Assembly, anchored_object
+from scenes.appearance import street_materials, vehicle_materials
+from scenes.appearance.materials import Shares
+from scenes.placement.assembly import Assembly, ObjectGroup, anchored_object
 from scenes.random_draws import chance, choose, uniform
 from scenes.shapes.anchored import MetricShape
 from scenes.shapes.street.cars import CarBody, CarDesign, CarGlass, CarLamps, CarTrim
 from scenes.shapes.street.road import Course
 from scenes.shapes.street.vans import CargoBox, VanBody, VanDesign, VanGlass, VanLamps, VanTrim
+from scenes.shapes.street.vehicle_details import CarInterior, CarOccupant, NumberPlates, VanSign
 from scenes.shapes.street.wheels import MIRROR_M, Wheel, WheelSet
 from scenes.spec import SceneObject
 from scenes.streets.config import DrivingConfig
@@ -43,6 +43,8 @@ class Model:
     half_width: float
     """With the mirrors."""
     parts: tuple[tuple[str, MetricShape, int], ...]
+    driver: tuple[tuple[str, MetricShape, int], ...]
+    """Parts that only a vehicle that moves has."""
     painted: tuple[tuple[str, MetricShape], ...]
     """Parts that have each vehicle's own paint."""
     wheel: Wheel
@@ -67,37 +69,65 @@ class Fleet:
         return choose(rng, self.large if self.large and chance(rng, self.large_share) else self.cars)
 
 
-def sample_fleet(rng: np.random.Generator, scene: Assembly, config: DrivingConfig, lit: bool) -> Fleet:
+def sample_fleet(
+    rng: np.random.Generator, scene: Assembly, config: DrivingConfig, *, keep_left: bool, lit: bool
+) -> Fleet:
     """Draw the models of vehicles of a scene; `lit` switches their lamps on."""
+    shares = config.shares
     shared = {
-        "glass": scene.material(street_materials.car_glass(rng)),
+        "dark glass": scene.material(vehicle_materials.dark_glass(rng)),
+        "glass": scene.material(vehicle_materials.clear_glass(rng)),
+        "seats": scene.material(vehicle_materials.upholstery(rng)),
+        "plate": scene.material(vehicle_materials.number_plate(rng)),
         "trim": scene.material(street_materials.black_plastic()),
-        "head": scene.material(street_materials.lamp((235, 240, 245), 4.0 if lit else 0.0)),
-        "tail": scene.material(street_materials.lamp((170, 16, 18), 1.5 if lit else 0.0)),
+        "head": scene.material(street_materials.lamp((235, 240, 245), 5.0 if lit else 0.0)),
+        "tail": scene.material(street_materials.lamp((170, 16, 18), 1.2 if lit else 0.0)),
     }
-    paints = [scene.material(street_materials.car_paint(rng)) for _ in range(9)]
-    cars = [_car_model(rng, scene, shared, paints) for _ in range(4)]
+    paints = [scene.material(vehicle_materials.car_paint(rng, shares)) for _ in range(9)]
+    cars = [_car_model(rng, scene, shares, shared, paints, keep_left) for _ in range(4)]
     kinds = choose(rng, [("van", "lorry"), ("van", "bus"), ("lorry", "bus"), ("van", "van")])
-    large = [_van_model(rng, scene, shared, paints, kind) for kind in kinds]
+    large = [_van_model(rng, scene, shares, shared, paints, kind) for kind in kinds]
     return Fleet(cars, large, uniform(rng, *config.large_vehicle_share))
 
 
-def _car_model(rng: np.random.Generator, scene: Assembly, shared: dict[str, int], paints: list[int]) -> Model:
+def _car_model(
+    rng: np.random.Generator,
+    scene: Assembly,
+    shares: Shares,
+    shared: dict[str, int],
+    paints: list[int],
+    keep_left: bool,
+) -> Model:
     design = CarDesign.sample(rng, choose(rng, _CAR_KINDS))
     wheel = Wheel(design.wheel_radius, uniform(rng, 0.19, 0.23), 0.66)
     wheels = _wheel_places(design)
+    clear = chance(rng, shares.transparent)
+    parts: list[tuple[str, MetricShape, int]] = [
+        ("glass", CarGlass(design), shared["glass" if clear else "dark glass"]),
+        ("trim", CarTrim(design), shared["trim"]),
+        (
+            "plates",
+            NumberPlates(design.length, design.clearance + 0.1, design.belt_height - 0.3),
+            shared["plate"],
+        ),
+        ("head lamps", CarLamps(design, rear=False), shared["head"]),
+        ("tail lamps", CarLamps(design, rear=True), shared["tail"]),
+    ]
+    driver: list[tuple[str, MetricShape, int]] = []
+    if clear:
+        # Traffic that keeps to the right is driven from the left.
+        parts.append(("interior", CarInterior(design, not keep_left), shared["seats"]))
+        body, head = (CarOccupant(design, not keep_left, head) for head in (False, True))
+        driver.append(("driver", body, scene.material(street_materials.cloth(rng, shares))))
+        driver.append(("driver's head", head, scene.material(street_materials.skin(rng))))
     return Model(
         length=design.length,
         half_width=design.width / 2 + MIRROR_M,
-        parts=(
-            ("glass", CarGlass(design), shared["glass"]),
-            ("trim", CarTrim(design), shared["trim"]),
-            ("head lamps", CarLamps(design, rear=False), shared["head"]),
-            ("tail lamps", CarLamps(design, rear=True), shared["tail"]),
-        ),
+        parts=tuple(parts),
+        driver=tuple(driver),
         painted=(("body", CarBody(design)),),
         wheel=wheel,
-        wheel_material=scene.material(street_materials.wheel(rng, wheel.radius, wheel.width)),
+        wheel_material=scene.material(vehicle_materials.wheel(rng, wheel.radius, wheel.width)),
         wheels=wheels,
         wheel_sets=(WheelSet(wheel, wheels), WheelSet(replace(wheel, sides=12), wheels)),
         paint=lambda rng: choose(rng, paints),
@@ -105,34 +135,43 @@ def _car_model(rng: np.random.Generator, scene: Assembly, shared: dict[str, int]
 
 
 def _van_model(
-    rng: np.random.Generator, scene: Assembly, shared: dict[str, int], paints: list[int], kind: str
+    rng: np.random.Generator,
+    scene: Assembly,
+    shares: Shares,
+    shared: dict[str, int],
+    paints: list[int],
+    kind: str,
 ) -> Model:
     design = VanDesign.sample(rng, kind)
     wheel = Wheel(design.wheel_radius, 0.23 if kind == "van" else 0.3, 0.66)
     wheels = _wheel_places(design)
     parts: list[tuple[str, MetricShape, int]] = [
-        ("glass", VanGlass(design), shared["glass"]),
+        ("glass", VanGlass(design), shared["dark glass"]),
         ("trim", VanTrim(design), shared["trim"]),
+        (
+            "plates",
+            NumberPlates(design.length, design.clearance + 0.08, design.clearance + 0.3),
+            shared["plate"],
+        ),
         ("head lamps", VanLamps(design, rear=False), shared["head"]),
         ("tail lamps", VanLamps(design, rear=True), shared["tail"]),
     ]
-    own = list(paints)
+    lettering = vehicle_materials.lettering(rng, shares)
     if kind == "lorry":
-        parts.append(("box", CargoBox(design), scene.material(street_materials.lettering(rng, _livery(rng)))))
-    elif kind == "bus" or chance(rng, 0.4):
-        own = [scene.material(street_materials.lettering(rng, _livery(rng)))]
-    elif chance(rng, 0.5):
-        own = [scene.material(plain((228, 228, 224), roughness=0.25, specular=0.5))]
+        parts.append(("box", CargoBox(design), scene.material(lettering)))
+    elif kind == "bus" or chance(rng, 0.6):
+        parts.append(("sign", VanSign(design), scene.material(lettering)))
     return Model(
         length=design.length,
         half_width=design.width / 2 + MIRROR_M,
         parts=tuple(parts),
+        driver=(),
         painted=(("body", VanBody(design)),),
         wheel=wheel,
-        wheel_material=scene.material(street_materials.wheel(rng, wheel.radius, wheel.width)),
+        wheel_material=scene.material(vehicle_materials.wheel(rng, wheel.radius, wheel.width)),
         wheels=wheels,
         wheel_sets=(WheelSet(wheel, wheels), WheelSet(replace(wheel, sides=12), wheels)),
-        paint=lambda rng: choose(rng, own),
+        paint=lambda rng: choose(rng, paints),
     )
 
 
@@ -140,14 +179,14 @@ def _wheel_places(design: CarDesign | VanDesign) -> tuple[tuple[float, float], .
     return tuple((x, side * design.track) for x in design.axles for side in (1.0, -1.0))
 
 
-def _livery(rng: np.random.Generator) -> Srgb:
-    light = uniform(rng, 0.4, 0.95)
-    return shade(light, uniform(rng, 0.0, 0.16), uniform(rng, 0.0, 360.0))
-
-
 def vehicle_of(name: str) -> str:
     """Name of the vehicle that a part belongs to: "parked L3" for the part "parked L3 head lamps"."""
     return " ".join(name.split()[:2])
+
+
+def hull(thing: ObjectGroup) -> list[SceneObject]:
+    """The large parts of a thing that is a vehicle; none of any other thing."""
+    return [item for item in thing if item.name.endswith((" body", " box"))]
 
 
 def _vehicle(
@@ -168,6 +207,7 @@ def _vehicle(
     turns = [course.facing(s, turn_deg) for s in s_m]
     paint = model.paint(rng)
     parts = [*model.parts, *[(part, shape, paint) for part, shape in model.painted]]
+    parts += model.driver if len(times) > 1 else ()
     objects = [
         anchored_object(f"{name} {part}", shape, material, places, turns, times)
         for part, shape, material in parts
@@ -296,15 +336,29 @@ def add_parked(
         if middle + model.length / 2 > drive.course.end_m - 2.0:
             return
         s += model.length + uniform(rng, 0.7, 1.8)
-        if any(abs(middle - crossing) < 5.0 + model.length / 2 for crossing in crossings) or not chance(
-            rng, taken
-        ):
+        reach = 5.0 + model.length / 2
+        blocked = side.is_open(middle, reach) or any(abs(middle - crossing) < reach for crossing in crossings)
+        if blocked or not chance(rng, taken):
             continue
         room = PARKING_M / 2 - model.half_width - _swing_m(drive.course, model, middle, middle)
         if room < 0.0:
             continue
         t = side.sign * (side.kerb_m - PARKING_M / 2 + uniform(rng, -1.0, 1.0) * room)
         turn = 0.0 if with_traffic != chance(rng, 0.12) else 180.0
-        name = f"parked {'LR'[side.sign < 0]}{number}"
+        name = f"parked {side.name}{number}"
         scene.add(*_vehicle(rng, name, model, drive.course, (middle,), t, turn, (0.0,)))
         number += 1
+
+
+def add_waiting(
+    rng: np.random.Generator,
+    scene: Assembly,
+    course: Course,
+    fleet: Fleet,
+    t_m: float,
+    front_m: float,
+    name: str,
+) -> None:
+    """A car that waits at the mouth of a side street, its front at s = `front_m`; `name` is two words."""
+    model = choose(rng, fleet.cars)
+    scene.add(*_vehicle(rng, name, model, course, (front_m + model.length / 2,), t_m, 180.0, (0.0,)))

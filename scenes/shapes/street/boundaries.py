@@ -35,6 +35,8 @@ class Fence(MetricShape):
     step: float
     """Distance between bars or pickets, metres."""
     seed: int
+    gates: bool = True
+    """Whether some of the panels are missing."""
 
     @classmethod
     def sample(cls, rng: np.random.Generator, style: str | None = None, course: Course | None = None) -> Self:
@@ -62,7 +64,8 @@ class Fence(MetricShape):
     def surface(self) -> Surface:
         rng = np.random.default_rng(self.seed)
         starts = np.arange(self.from_m, self.to_m - self.panel, self.panel)
-        starts = starts[(rng.random(len(starts)) > _GATES) | (np.arange(len(starts)) == 0)]
+        if self.gates:
+            starts = starts[(rng.random(len(starts)) > _GATES) | (np.arange(len(starts)) == 0)]
         vertices, triangles = self._mesh() if self.style == "mesh" else boxes(*self._boxes())
         count = len(vertices)
         along = (starts[:, None] + vertices[:, 0]).ravel()

@@ -130,7 +130,7 @@ class _Opening:
     top: float
 
 
-def _storeys(design: HouseDesign, front: bool) -> list[tuple[float, float, list[_Opening]]]:
+def storeys(design: HouseDesign, front: bool) -> list[tuple[float, float, list[_Opening]]]:
     """Each storey's floor, ceiling and openings, along a wall of `design.width`."""
     storeys = []
     wide, high = design.opening
@@ -156,7 +156,7 @@ def _storeys(design: HouseDesign, front: bool) -> list[tuple[float, float, list[
 def _wall(design: HouseDesign, front: bool) -> list[_Box]:
     """One wall from piers, and between them what is above and below the openings."""
     items: list[_Box] = []
-    for floor, (bottom, ceiling, openings) in enumerate(_storeys(design, front)):
+    for floor, (bottom, ceiling, openings) in enumerate(storeys(design, front)):
         low = -0.3 if floor == 0 else bottom - 0.002 * floor
         # Storeys overlap by a little and stand a hair apart in depth, so that no faces coincide.
         out = 0.004 * (floor % 2)
@@ -287,7 +287,7 @@ class HouseTrim(MetricShape):
     def _windows(self, design: HouseDesign, front: bool) -> list[_Box]:
         items: list[_Box] = []
         plane = design.reveal - 0.035
-        for floor, (_, _, openings) in enumerate(_storeys(design, front)):
+        for floor, (_, _, openings) in enumerate(storeys(design, front)):
             for bay, o in enumerate(openings):
                 door = front and floor == 0 and bay == design.door_bay
                 middle, wide = (o.left + o.right) / 2, o.right - o.left

@@ -379,3 +379,20 @@ class BusShelter(MetricShape):
             low.append((-half + 0.01, 0.01, z))
             high.append((half - 0.01, 0.05, z + 0.05))
         return Surface(*boxes(np.array(low), np.array(high)))
+
+
+@dataclass(frozen=True)
+class ShelterPanes(MetricShape):
+    """The glass in the back and the sides of a shelter."""
+
+    shelter: BusShelter
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator) -> Self:
+        return cls(BusShelter.sample(rng))
+
+    def surface(self) -> Surface:
+        half, d = self.shelter.length / 2, self.shelter.depth
+        low = [(-half + 0.02, 0.024, 0.29), (-half + 0.024, 0.05, 0.3), (half - 0.036, 0.05, 0.3)]
+        high = [(half - 0.02, 0.036, 2.06), (-half + 0.036, d - 0.08, 2.05), (half - 0.024, d - 0.08, 2.05)]
+        return Surface(*boxes(np.array(low), np.array(high)))

@@ -1,4 +1,4 @@
-"""People on foot, part by part: clothes above, clothes below, skin, hair.
+"""People on foot, part by part: clothes above, clothes below, skin, features, hair, and what they wear besides.
 
 The parts of one person share one design and one origin: the ground between the feet; x is forward, y to the
 left, z up, metres.
@@ -32,9 +32,13 @@ class PersonDesign:
     arms_deg: float
     """How far the upper arms stand off the body, sideways."""
     skirt: float
-    """Length of a skirt or coat below the waist, metres; 0 for trousers alone."""
-    hair: float
-    """How far the hair comes down, metres below the crown."""
+    """Length of a skirt below the waist, metres; 0 for trousers alone."""
+    coat: float
+    """How far the coat comes down below the waist, metres; 0 for a jacket or shirt."""
+    hair: str
+    """short, bob, long, tail, or bald with a rim of hair."""
+    hat: str
+    """none, cap, woollen or brimmed."""
     bag: str
     """none, backpack or hand."""
 
@@ -48,8 +52,10 @@ class PersonDesign:
             stride_deg=uniform(rng, 3.0, 24.0),
             lead=1.0 if chance(rng, 0.5) else -1.0,
             arms_deg=uniform(rng, 4.0, 14.0),
-            skirt=uniform(rng, 0.25, 0.6) if chance(rng, 0.35) else 0.0,
-            hair=uniform(rng, 0.09, 0.3),
+            skirt=uniform(rng, 0.25, 0.6) if chance(rng, 0.25) else 0.0,
+            coat=uniform(rng, 0.15, 0.5) if chance(rng, 0.35) else 0.0,
+            hair=str(rng.choice(["short", "short", "bob", "long", "tail", "bald"])),
+            hat=str(rng.choice(["none", "none", "none", "cap", "woollen", "brimmed"])),
             bag=str(rng.choice(["none", "none", "backpack", "hand"])),
         )
 
@@ -126,7 +132,7 @@ def _ball(middle: tuple[float, float, float], size: tuple[float, float, float]) 
 
 @dataclass(frozen=True)
 class PersonTop(MetricShape):
-    """Jacket or shirt: torso and sleeves, and a backpack."""
+    """Shirt, jacket or coat: torso, sleeves, a collar."""
 
     design: PersonDesign
 
@@ -150,16 +156,18 @@ class PersonTop(MetricShape):
             (1.52, 0.05, 0.05, -0.01),
         ]
         sleeves = [_limb(design.arm(side), (0.062, 0.05, 0.042)) for side in (1.0, -1.0)]
-        parts = [_stack(levels, design.girth), *sleeves]
-        if design.bag == "backpack":
-            back = -0.1 * design.girth
-            parts.append(boxes(np.array((back - 0.16, -0.14, 1.02)), np.array((back, 0.14, 1.44))))
+        collar = _stack([(1.47, 0.085, 0.08, -0.012), (1.535, 0.068, 0.07, -0.012)], 1.0)
+        parts = [_stack(levels, design.girth), *sleeves, collar]
+        if design.coat:
+            low, wide = 0.9 - design.coat, 0.19 + 0.1 * design.coat
+            tails = [(low, wide, 0.15, 0.0), (low + 0.02, wide + 0.01, 0.155, 0.0), (0.98, 0.176, 0.122, 0.0)]
+            parts.append(_stack(tails, design.girth))
         return design.placed(*parts)
 
 
 @dataclass(frozen=True)
 class PersonLegs(MetricShape):
-    """Trousers or skirt, shoes, and a bag in the hand."""
+    """Trousers or skirt."""
 
     design: PersonDesign
 
@@ -181,9 +189,7 @@ class PersonLegs(MetricShape):
         for side in (1.0, -1.0):
             leg = design.leg(side)
             thick = 0.5 + 0.5 * design.girth
-            parts.append(_limb(leg, (0.085 * thick, 0.062 * thick, 0.048)))
-            x, y, z = leg[2]
-            parts.append(_ball((x + 0.055, y, z - 0.035), (0.13, 0.047, 0.042)))
+            parts.append(_limb(leg, (0.085 * thick, 0.062 * thick, 0.05)))
         if design.skirt:
             low = 0.9 - design.skirt
             spread = 0.12 + 0.25 * design.skirt
@@ -193,17 +199,62 @@ class PersonLegs(MetricShape):
                 (0.95, 0.172, 0.118, 0.0),
             ]
             parts.append(_stack(skirt, design.girth))
-        if design.bag == "hand":
+        return design.placed(*parts)
+
+
+@dataclass(frozen=True)
+class PersonThings(MetricShape):
+    """Shoes, hat and bag."""
+
+    design: PersonDesign
+
+    smooth: ClassVar[bool] = True
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator) -> Self:
+        return cls(PersonDesign.sample(rng))
+
+    def surface(self) -> Surface:
+        design = self.design
+        parts = []
+        for side in (1.0, -1.0):
+            x, y, z = design.leg(side)[2]
+            parts.append(_ball((x + 0.055, y, z - 0.035), (0.13, 0.047, 0.042)))
+            parts.append(
+                boxes(np.array((x - 0.06, y - 0.04, z - 0.07)), np.array((x + 0.16, y + 0.04, z - 0.05)))
+            )
+        parts += self._hat()
+        if design.bag == "backpack":
+            back = -0.1 * design.girth
+            parts.append(boxes(np.array((back - 0.16, -0.14, 1.02)), np.array((back, 0.14, 1.44))))
+        elif design.bag == "hand":
             x, y, z = design.arm(-1.0)[2]
             parts.append(
                 boxes(np.array((x - 0.17, y - 0.08, z - 0.48)), np.array((x + 0.17, y + 0.04, z - 0.14)))
             )
         return design.placed(*parts)
 
+    def _hat(self) -> list[Part]:
+        hat = self.design.hat
+        if hat == "none":
+            return []
+        if hat == "woollen":
+            return [
+                _stack(
+                    [(1.69, 0.1, 0.115, -0.01), (1.73, 0.099, 0.112, -0.01), (1.79, 0.06, 0.07, -0.015)], 1.0
+                )
+            ]
+        crown = _stack(
+            [(1.7, 0.096, 0.11, -0.005), (1.75, 0.09, 0.1, -0.01), (1.79, 0.06, 0.065, -0.01)], 1.0
+        )
+        if hat == "cap":
+            return [crown, _stack([(1.698, 0.07, 0.08, 0.12), (1.708, 0.07, 0.08, 0.12)], 1.0)]
+        return [crown, _stack([(1.698, 0.18, 0.19, 0.0), (1.71, 0.17, 0.18, 0.0)], 1.0)]
+
 
 @dataclass(frozen=True)
 class PersonSkin(MetricShape):
-    """Head, neck and hands."""
+    """Head with nose, chin and ears, neck and hands."""
 
     design: PersonDesign
 
@@ -218,6 +269,8 @@ class PersonSkin(MetricShape):
         neck = [(1.45, 0.05, 0.052, -0.01), (1.6, 0.05, 0.05, 0.0)]
         parts = [_ball((0.012, 0.0, 1.635), (0.098, 0.076, 0.118)), _stack(neck, 1.0)]
         parts.append(_ball((0.108, 0.0, 1.62), (0.02, 0.014, 0.024)))
+        parts.append(_ball((0.055, 0.0, 1.545), (0.042, 0.042, 0.032)))
+        parts += [_ball((0.0, side * 0.078, 1.63), (0.022, 0.012, 0.032)) for side in (1.0, -1.0)]
         for side in (1.0, -1.0):
             hand = design.arm(side)[2] + 0.05 * _directions(design.arm(side))[1]
             parts.append(_ball((float(hand[0]), float(hand[1]), float(hand[2])), (0.042, 0.03, 0.075)))
@@ -225,8 +278,8 @@ class PersonSkin(MetricShape):
 
 
 @dataclass(frozen=True)
-class PersonHair(MetricShape):
-    """Hair or a cap over the head."""
+class PersonFeatures(MetricShape):
+    """Eyes, brows and mouth."""
 
     design: PersonDesign
 
@@ -237,8 +290,37 @@ class PersonHair(MetricShape):
         return cls(PersonDesign.sample(rng))
 
     def surface(self) -> Surface:
-        design = self.design
-        parts = [_ball((-0.012, 0.0, 1.672), (0.1, 0.086, 0.098))]
-        if design.hair > 0.12:
-            parts.append(_ball((-0.05, 0.0, 1.72 - 0.6 * design.hair), (0.06, 0.08, 0.55 * design.hair)))
-        return design.placed(*parts)
+        parts = [_ball((0.103, 0.0, 1.578), (0.009, 0.026, 0.007))]
+        for side in (1.0, -1.0):
+            parts.append(_ball((0.1, side * 0.032, 1.648), (0.01, 0.014, 0.009)))
+            parts.append(_ball((0.1, side * 0.034, 1.67), (0.012, 0.02, 0.005)))
+        return self.design.placed(*parts)
+
+
+@dataclass(frozen=True)
+class PersonHair(MetricShape):
+    """Hair over the head, of one of several cuts."""
+
+    design: PersonDesign
+
+    smooth: ClassVar[bool] = True
+
+    @classmethod
+    def sample(cls, rng: np.random.Generator) -> Self:
+        return cls(PersonDesign.sample(rng))
+
+    def surface(self) -> Surface:
+        cut = self.design.hair
+        if cut == "bald":
+            return self.design.placed(_ball((-0.03, 0.0, 1.62), (0.085, 0.083, 0.06)))
+        parts = [_ball((-0.014, 0.0, 1.672), (0.1, 0.086, 0.098))]
+        if cut == "bob":
+            parts += [_ball((-0.02, side * 0.055, 1.6), (0.075, 0.035, 0.1)) for side in (1.0, -1.0)]
+            parts.append(_ball((-0.06, 0.0, 1.6), (0.05, 0.075, 0.1)))
+        elif cut == "long":
+            parts.append(_ball((-0.065, 0.0, 1.53), (0.055, 0.09, 0.2)))
+            parts += [_ball((-0.02, side * 0.065, 1.56), (0.06, 0.03, 0.14)) for side in (1.0, -1.0)]
+        elif cut == "tail":
+            parts.append(_ball((-0.12, 0.0, 1.69), (0.035, 0.03, 0.03)))
+            parts.append(_ball((-0.14, 0.0, 1.58), (0.028, 0.032, 0.12)))
+        return self.design.placed(*parts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Self
 
@@ -15,7 +15,7 @@ from scenes.geometry.building import Triangles, Vertices, joined, slab_triangles
 from scenes.geometry.polyhedra import boxes, loft, outward
 from scenes.random_draws import chance, integer, uniform
 from scenes.shapes.anchored import MetricShape, Surface
-from scenes.spec import Vector
+from scenes.spec import OMIT_DEFAULT, Vector
 
 _STEP_M = 0.5
 """Spacing at which a course's position is tabulated."""
@@ -26,13 +26,15 @@ class Course:
     """A street's centre line: headings at equal steps, smooth between, never turning back on itself.
 
     Street coordinates are (s, t), as in OpenDRIVE: metres along the line, metres to its left. s = 0 is the
-    world's origin, where the heading is that of the x axis.
+    world's origin, where the heading is that of the x axis, unless `origin` says otherwise.
     """
 
     start_m: float
     """s of the first heading; negative."""
     spacing_m: float
     headings_deg: tuple[float, ...]
+    origin: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), metadata=OMIT_DEFAULT)
+    """World x and y of s = 0, and the heading there in degrees."""
 
     @classmethod
     def sample(cls, rng: np.random.Generator, start_m: float, end_m: float, bend_deg: float) -> Self:
@@ -51,15 +53,16 @@ class Course:
 
     @cached_property
     def _table(self) -> NDArray[np.float64]:
-        """(N, 4) columns s, x, y, heading in radians; s = 0 at the origin with heading 0."""
+        """(N, 4) columns s, x, y, heading in radians."""
         knots = self.start_m + self.spacing_m * np.arange(len(self.headings_deg))
         s = np.linspace(knots[0], knots[-1], round(self.spacing_m * (len(knots) - 1) / _STEP_M) + 1)
         heading = np.radians(PchipInterpolator(knots, self.headings_deg)(s))
-        heading = heading - np.interp(0.0, s, heading)
+        at_x, at_y, towards_deg = self.origin
+        heading = heading - np.interp(0.0, s, heading) + np.radians(towards_deg)
         step = np.diff(s) / 2
         x = np.concatenate([[0.0], np.cumsum(step * (np.cos(heading[1:]) + np.cos(heading[:-1])))])
         y = np.concatenate([[0.0], np.cumsum(step * (np.sin(heading[1:]) + np.sin(heading[:-1])))])
-        return np.stack([s, x - np.interp(0.0, s, x), y - np.interp(0.0, s, y), heading], -1)
+        return np.stack([s, x - np.interp(0.0, s, x) + at_x, y - np.interp(0.0, s, y) + at_y, heading], -1)
 
     def heading(self, s_m: NDArray[np.float64] | float) -> NDArray[np.float64]:
         """Radians from the x axis towards the y axis."""
@@ -149,6 +152,14 @@ class RoadStrip(MetricShape):
         return Surface(vertices, triangles, uv[triangles])
 
 
+def crown_height(road: tuple[float, float, float], t_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Height above the edges of a road with a left edge, a right edge and a crown (metres), at distances `t_m`."""
+    left, right, crown = road
+    # A strip is flat between quarter points of its parabola.
+    quarter = np.linspace(0.0, 1.0, 5)
+    return np.interp((left - t_m) / (left - right), quarter, crown * 4 * quarter * (1 - quarter))
+
+
 @dataclass(frozen=True)
 class Stripe:
     """A painted bar: a rectangle in street coordinates, or a slanted one."""
@@ -180,12 +191,6 @@ class RoadMarkings(MetricShape):
         stripes = tuple(Stripe(float(s), float(s) + dash, width / 2, -width / 2) for s in starts)
         return cls(course, stripes, (4.0, -4.0, 0.05 if chance(rng, 0.5) else 0.0))
 
-    def _height(self, t_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        left, right, crown = self.road
-        # The strip below is flat between quarter points of its parabola.
-        quarter = np.linspace(0.0, 1.0, 5)
-        return np.interp((left - t_m) / (left - right), quarter, crown * 4 * quarter * (1 - quarter))
-
     def surface(self) -> Surface:
         return Surface(*joined(*(self._bar(stripe) for stripe in self.stripes)))
 
@@ -199,7 +204,7 @@ class RoadMarkings(MetricShape):
         )
         s = s + stripe.shear * np.linspace(0.0, 1.0, columns)
         plan = self.course.point(s, t).reshape(-1, 2)
-        height = self._height(t).ravel()
+        height = crown_height(self.road, t).ravel()
         vertices = np.concatenate(
             [
                 np.column_stack([plan, height + self.thickness_m]),

@@ -163,6 +163,12 @@ class CargoBox(MetricShape):
                 high.append((x + 0.1, y + 0.1, design.height - 0.005))
         low.append((rear + 0.01, -half + 0.01, floor - 0.12))
         high.append((front - 0.01, half - 0.01, floor + 0.06))
+        for x in np.arange(rear + 0.7, front - 0.5, 0.62).tolist():  # ribs of the side walls
+            low.append((x, -half + 0.006, floor))
+            high.append((x + 0.05, half - 0.006, design.height - 0.05))
+        # The gap between the rear doors, and their lock.
+        low += [(rear + 0.015, -0.02, floor + 0.1), (rear + 0.005, 0.12, floor + 0.3)]
+        high += [(rear + 0.2, 0.02, design.height - 0.15), (rear + 0.2, 0.16, design.height - 0.4)]
         return Surface(*boxes(np.array(low), np.array(high)))
 
 
@@ -200,7 +206,27 @@ class VanGlass(MetricShape):
                 inner = np.column_stack([face[:, 0], np.full(4, side * (half - 0.05)), face[:, 1]])
                 outer = inner + np.array((0.0, side * 0.058, 0.0))
                 bodies.append(np.concatenate([inner, outer]))
+        bodies += self._rear_windows()
         return Surface(*hexahedra(np.stack(bodies)))
+
+    def _rear_windows(self) -> list[NDArray[np.float64]]:
+        """Two windows in the rear doors of a van, one wide one in the tail of a bus."""
+        design = self.design
+        if design.kind == "lorry":
+            return []
+        top = min(design.height, 3.3) - 0.3
+        half = design.width / 2 - 0.2
+        spans = [(-half, half)] if design.kind == "bus" else [(-half, -0.08), (0.08, half)]
+        rear = -design.length / 2
+        return [
+            np.array([(x, y, z) for x in (rear - 0.012, rear + 0.1) for y, z in self._corners(span, top)])
+            for span in spans
+        ]
+
+    @staticmethod
+    def _corners(span: tuple[float, float], top: float) -> list[tuple[float, float]]:
+        low, high = span
+        return [(low, top - 0.62), (high, top - 0.62), (high - 0.03, top - 0.12), (low + 0.03, top - 0.12)]
 
     def _side_windows(self) -> list[tuple[float, float, float, float]]:
         """Rear and front x, lower and upper z of each window on a side."""
@@ -247,7 +273,30 @@ class VanTrim(MetricShape):
             (half + 0.012, 0.5 * wide, 0.82),
             (-half + 0.3, wide - 0.06, design.clearance + 0.22),
         ]
+        if design.kind == "van":
+            self._add_door_gaps(low, high)
         return Surface(*boxes(np.array(low), np.array(high)))
+
+    def _add_door_gaps(
+        self, low: list[tuple[float, float, float]], high: list[tuple[float, float, float]]
+    ) -> None:
+        """The gaps between doors, as dark lines, and handles beside them."""
+        design = self.design
+        rear, half, top = -design.length / 2, design.width / 2, design.height - 0.16
+        sill = design.clearance + 0.25
+        low.append((rear - 0.004, -0.008, sill))
+        high.append((rear + 0.1, 0.008, top))
+        low.append((rear - 0.03, 0.05, 1.0))
+        high.append((rear + 0.1, 0.2, 1.04))
+        front = design.screen_foot[0] - 0.16
+        for side in (-1.0, 1.0):
+            for x in (front - 1.02, front - 2.1):
+                low.append((x - 0.008, side * half - 0.005, sill + 0.1))
+                high.append((x + 0.008, side * half + 0.005, top))
+            low.append((front - 1.3, side * half - 0.02, 1.0))
+            high.append((front - 1.12, side * half + 0.02, 1.035))
+            low.append((rear + 0.3, side * half - 0.004, 1.2))
+            high.append((front - 2.1, side * half + 0.012, 1.23))
 
 
 @dataclass(frozen=True)

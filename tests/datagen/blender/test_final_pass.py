@@ -20,7 +20,7 @@ from datagen.rendering.sensor import Sensor, vignette
 from scenes import Scene
 from scenes.motion.deformations.sway import Sway
 from scenes.shapes.solids.basic import Box, Plane
-from scenes.spec import FinalPass, Fog, Material, SceneObject, StereoCamera, Trajectory, World
+from scenes.spec import FinalPass, Fog, Material, Rain, SceneObject, StereoCamera, Trajectory, World
 from scenes.textures.plain import SolidColor
 
 WIDTH, HEIGHT = 96, 64
@@ -69,7 +69,14 @@ def final_radiance(scene: Scene, folder: Path, frame: int = 0, exposure: float =
 
 
 MOVING_EVERYTHING = world_of(
-    FinalPass(shutter_frames=0.8, noise=0.03, vignetting=0.2, fog=Fog((0.6, 0.6, 0.7), 12.0), f_number=0.05),
+    FinalPass(
+        shutter_frames=0.8,
+        noise=0.03,
+        vignetting=0.2,
+        fog=Fog((0.6, 0.6, 0.7), 12.0),
+        f_number=0.05,
+        rain=Rain(3.0, (0.02, 0.0, -0.2), 0.003, 0.5),
+    ),
     plate(RIGHTWARDS),
     SceneObject(
         "swaying",

@@ -94,16 +94,25 @@ def disparity_at(rig: Rig, depth: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def scenes_of(world: str, sizes: tuple[tuple[int, int, int], ...]) -> Iterator[Scene]:
-    family, _, rig = world.partition(" ")
+    family, _, kind = world.partition(" ")
+    rig = kind == "own rig"
     for width, height, count in sizes:
         for seed in range(MORE_SCENES or count):
             config = FAMILIES[family].config(width=width, height=height)
-            config = replace(config, rig=own_rig(width, height)) if rig else config
+            config = (
+                replace(config, rig=own_rig(width, height))
+                if rig
+                else replace(config, **AT_NIGHT.get(kind, {}))
+            )
             scene = sample_scene(np.random.default_rng([seed, width]), family, config)
-            yield replace(scene, notes={**scene.notes, "own_rig": float(bool(rig))})
+            yield replace(scene, notes={**scene.notes, "own_rig": float(rig)})
 
 
-WORLDS = [*sorted(FAMILIES), *(f"{family} own rig" for family in sorted(FAMILIES))]
+AT_NIGHT: dict[str, dict[str, Any]] = {
+    "night rain": {"night_share": 1.0, "dusk_share": 0.0, "rain_share": 1.0, "transparent_share": 1.0}
+}
+"""Worlds of a family in which pictures are hardest to make: lamps, mirrors of water, clear glass, drops."""
+WORLDS = [*sorted(FAMILIES), *(f"{family} own rig" for family in sorted(FAMILIES)), "driving night rain"]
 """Every family, by its own cameras and by somebody's rig."""
 
 
@@ -123,7 +132,10 @@ def worlds(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     return made
 
 
-@pytest.fixture(scope="module", params=[*sorted(FAMILIES), "flying_things own rig", "driving own rig"])
+@pytest.fixture(
+    scope="module",
+    params=[*sorted(FAMILIES), "flying_things own rig", "driving own rig", "driving night rain"],
+)
 def pictures(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> list[Picture]:
     """A few random scenes of a family, rendered."""
     made = []
@@ -166,7 +178,9 @@ def errors(
 
 
 def named(worlds: list[World]) -> str:
-    return worlds[0].scene.family + (" own rig" if worlds[0].scene.notes["own_rig"] else "")
+    scene = worlds[0].scene
+    dark = scene.final.rain is not None and all(world.scene.final.rain for world in worlds)
+    return scene.family + (" own rig" if scene.notes["own_rig"] else " night rain" if dark else "")
 
 
 @pytest.mark.slow

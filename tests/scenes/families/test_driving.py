@@ -24,7 +24,7 @@ BRIEF = dataclasses.replace(
     SMALL, frames=5, view_m=(50.0, 60.0), pedestrians_per_100m=(5.0, 9.0), headway_m=(7.0, 15.0)
 )
 """Short busy streets."""
-UNDERFOOT = ("road", "markings", "centre line", "repairs", "plain", "left ", "right ")
+UNDERFOOT = ("road", "markings", "centre line", "repairs", "puddles", "plain", "left ", "right ")
 
 
 def sampled(seed: int, config: DrivingConfig = SMALL) -> Scene:
