@@ -47,12 +47,12 @@ def sample_framing(rng: np.random.Generator, config: LandscapeConfig, characters
     if kind == "near":
         # From the height of its chest, or it would stand before nothing but sky.
         close, aim = uniform(rng, 1.0, 1.6), uniform(rng, 0.6, 0.74)
-        return Framing(kind, close, count, (1.3, 4.5), aim=aim, above=(-0.35, 0.05), eye=(0.5, 0.95))
+        return Framing(kind, close, count, (1.3, 4.5), aim=aim, above=(-0.25, 0.12), eye=(0.5, 0.95))
     if kind == "far":
         first = uniform(rng, 1.9, 4.5)
         return Framing(kind, high, count, (first, 1.8 * first), first, spread=0.8)
     if kind == "several":
-        count = max(count, min(3, characters[1])) + integer(rng, 0, 2)
+        count = max(count, min(3, characters[1])) + integer(rng, 0, min(2, characters[1]))
         return Framing(kind, 0.85 * high, count, (0.9, 1.9), spread=0.75)
     if kind == "none":
         return Framing(kind, high, 0, (1.0, 2.0), aim=0.4)
