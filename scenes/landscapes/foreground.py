@@ -150,6 +150,7 @@ def add_foreground(
 def _stand(
     rng: np.random.Generator, placement: GroundPlacement, name: str, prop: Prop, spot: Spot, unit_m: float
 ) -> bool:
+    """Stand a thing on the lowest ground under it, so that no end of it hangs free."""
     box = placement.box_of(prop.shape, spot, unit_m, prop.sunk * unit_m)
     if placement.is_wet(spot) or not placement.allows(box):
         return False
@@ -158,5 +159,6 @@ def _stand(
         for part, look in prop.looks.items()
     }
     if list(materials) == [""]:
-        return placement.stand(name, prop.shape, materials[""], spot, unit_m, sunk_m=prop.sunk * unit_m)
-    return placement.stand_in_parts(name, prop.shape, materials, spot, unit_m)  # type: ignore[arg-type]
+        sunk_m = prop.sunk * unit_m
+        return placement.stand(name, prop.shape, materials[""], spot, unit_m, sunk_m=sunk_m, on_lowest=True)
+    return placement.stand_in_parts(name, prop.shape, materials, spot, unit_m, on_lowest=True)  # type: ignore[arg-type]

@@ -229,6 +229,5 @@ def scree(
     pairs = _pairings(rng, kinds, rocks)
     for index, spot in enumerate(area.spots(rng, count, depths, 1.1)):
         shape, material = choose(rng, pairs)
-        placement.stand(
-            f"scree {index}", shape, material, spot, log_uniform(rng, *scales) * unit_m, wades=True
-        )
+        scale_m = log_uniform(rng, *scales) * unit_m
+        placement.stand(f"scree {index}", shape, material, spot, scale_m, on_lowest=True, wades=True)
