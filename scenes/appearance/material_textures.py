@@ -30,13 +30,14 @@ from scenes.appearance.palettes import (
     PaletteRange,
     sample_palette_in,
 )
-from scenes.random_draws import choose, integer, uniform
+from scenes.random_draws import choose, integer, new_seed, uniform
 from scenes.spec import Texture
 from scenes.textures.cells import Cobblestones, VoronoiCells
 from scenes.textures.collages import DeadLeaves
 from scenes.textures.natural import Hair, Iris, LeafVeins, Litter, RoughBark, Strata
 from scenes.textures.noise import FractalNoise, Labyrinth, WoodPlanks
-from scenes.textures.plain import Gradient
+from scenes.textures.plain import Gradient, NearTextureless
+from scenes.textures.structured import HewnRock, SandRipples, WovenCloth
 from scenes.textures.tiles import Bricks, Dots, Stripes, Weave
 
 TextureSampler = Callable[[np.random.Generator, int], Texture]
@@ -68,9 +69,11 @@ def ground(colors: PaletteRange, under: PaletteRange = EARTH) -> TextureSampler:
 
 
 def grains(colors: PaletteRange) -> TextureSampler:
-    """Sand, snow, dust: soft clouds and grit of one colour."""
+    """Sand, snow, dust: ripples of the wind, or soft clouds and grit of one colour."""
 
     def sample(rng: np.random.Generator, size: int) -> Texture:
+        if rng.random() < 0.6:
+            return SandRipples.of(rng, size, sample_palette_in(rng, colors, 4))
         noise = FractalNoise.sample(rng, size)
         return replace(
             noise, palette=sample_palette_in(rng, colors, 4), slope=uniform(rng, 0.5, 1.0), ridges=False
@@ -80,9 +83,12 @@ def grains(colors: PaletteRange) -> TextureSampler:
 
 
 def rock(colors: PaletteRange = ROCK, dust: PaletteRange = MOSS) -> TextureSampler:
-    """Layered or massive rock with moss, sand or snow in its hollows; `dust` are the colours of those."""
+    """Layered, jointed or massive rock with moss, sand or snow in its hollows; `dust` are the colours of those."""
 
     def sample(rng: np.random.Generator, size: int) -> Texture:
+        if rng.random() < 0.45:
+            palette = (*sample_palette_in(rng, colors, 4), sample_palette_in(rng, dust, 1)[0])
+            return HewnRock.of(rng, size, palette)
         return Strata.of(rng, size, sample_palette_in(rng, colors, 4), sample_palette_in(rng, dust, 1)[0])
 
     return sample
@@ -170,8 +176,9 @@ def hide(rng: np.random.Generator, size: int) -> Texture:
 
 
 def skin(rng: np.random.Generator, size: int) -> Texture:
-    """Human skin."""
-    return _noise(rng, size, sample_palette_in(rng, SKIN, 3), low_cycles=6.0)
+    """Human skin: of one colour, a little blotched, with pores."""
+    color = sample_palette_in(rng, SKIN, 3)[1]
+    return NearTextureless(size, new_seed(rng), color, uniform(rng, 0.03, 0.07), uniform(rng, 0.02, 0.05))
 
 
 def hair(rng: np.random.Generator, size: int) -> Texture:
@@ -186,12 +193,28 @@ def leather(rng: np.random.Generator, size: int) -> Texture:
 
 
 def cloth(rng: np.random.Generator, size: int) -> Texture:
-    """Woven, striped, spotted or plain cloth of one hue."""
+    """Cloth of one hue: woven of fine threads, striped, worn; now and then spotted or dyed in clouds."""
     palette = sample_palette_in(rng, CLOTH, 3, hue_spread_deg=40.0)
-    kind = choose(rng, (Weave, Stripes, Dots, Gradient, Labyrinth, None), (0.3, 0.15, 0.1, 0.1, 0.1, 0.25))
-    if kind is None:
+    kind = rng.random()
+    if kind < 0.8:
+        one, two, faded = (palette[int(k)] for k in rng.permutation(3))
+        return WovenCloth.of(rng, size, (one, two, faded))
+    if kind < 0.9:
         return _noise(rng, size, palette, low_cycles=4.0)
-    return _recolored(kind.sample(rng, size), palette)
+    dots = Dots.sample(rng, size)
+    return _recolored(replace(dots, columns=2 * integer(rng, 7, 14), grain=0.03), palette)
+
+
+def straw(rng: np.random.Generator, size: int) -> Texture:
+    """Plaited straw."""
+    palette = sample_palette_in(rng, DRY_GRASS, 2)
+    return replace(Weave.sample(rng, size), palette=palette, strands=2 * integer(rng, 14, 24), gap=0.15)
+
+
+def painted_boards(rng: np.random.Generator, size: int) -> Texture:
+    """Boards in stripes of paint."""
+    stripes = Stripes.sample(rng, size)
+    return _recolored(stripes, sample_palette_in(rng, VIVID, 3, hue_spread_deg=120.0))
 
 
 def cap(rng: np.random.Generator, size: int) -> Texture:
@@ -217,18 +240,6 @@ SNOWY = rock(ROCK, SNOW)
 """Rock with snow in its hollows."""
 DESERT_ROCK = rock(RED_ROCK, SAND)
 """Red rock with sand in its hollows."""
-CHARACTER_TEXTURES: dict[str, TextureSampler] = {
-    "fur": fur,
-    "hide": hide,
-    "skin": skin,
-    "hair": hair,
-    "cloth": cloth,
-    "leather": leather,
-    "wood": timber,
-    "horn": horn,
-    "eye": eye,
-}
-"""Texture samplers by the names of `scenes.landscapes.characters.CharacterPart.material`."""
 
 
 def _noise(rng: np.random.Generator, size: int, palette: Palette, low_cycles: float = 3.0) -> Texture:

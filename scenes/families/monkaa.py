@@ -1,8 +1,8 @@
 """Soft, furry creatures among plants, after Monkaa (Mayer et al. 2016), with procedural creatures.
 
-Creatures with limbs, tails and eyes walk or gesture in a jungle, a meadow, a grove of giant mushrooms or a
-cave; plants sway, lamps are coloured, the camera drifts. Lengths are in units of the distance of the main
-creature, a few metres.
+Creatures with limbs, tails and eyes walk, sit, graze, reach or look about in a jungle, a meadow, a grove of giant
+mushrooms or a cave, some at a pond; they are near, far, in groups, or nobody is there. Plants sway, lamps are
+coloured, the camera drifts. Lengths are in units of a few metres.
 """
 
 from __future__ import annotations
@@ -12,11 +12,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenes.appearance.landscape_materials import CHARACTER_SURFACES
 from scenes.appearance.lights import sample_area_light, sample_light_color, sample_sun
-from scenes.appearance.material_textures import TextureSampler, eye, fur, ground, hide, horn, leaves, rock
+from scenes.appearance.material_textures import TextureSampler, ground, leaves, rock
 from scenes.appearance.palettes import DRY_GRASS, EARTH, FOLIAGE, MOSS, ROCK, VIVID
+from scenes.appearance.room_materials import Shares
 from scenes.family import Family
-from scenes.landscapes.characters import Character, Coat, place_character, sample_creature
+from scenes.landscapes.characters import Character, place_character
+from scenes.landscapes.creatures import Coat, sample_creature
+from scenes.landscapes.foreground import (
+    PropSampler,
+    add_foreground,
+    broad_leaves,
+    crystals,
+    outcrop,
+    paling,
+    smooth_boulder,
+    toadstool,
+    trunk,
+    vessel,
+)
+from scenes.landscapes.framing import Framing, sample_framing
 from scenes.landscapes.terrain import (
     Land,
     LandscapeConfig,
@@ -33,9 +49,11 @@ from scenes.landscapes.vegetation import (
     grass,
     mushrooms,
     plants,
+    scree,
     trees,
     undergrowth,
 )
+from scenes.landscapes.water import add_water, with_pond
 from scenes.motion.trajectories import vector
 from scenes.placement.ground import GroundPlacement, Spot, sway_of
 from scenes.random_draws import Count, Range, chance, choose, integer, log_uniform, new_seed, uniform
@@ -59,10 +77,14 @@ class MonkaaConfig(LandscapeConfig):
 
     crowd = ("creatures", "fur_locks", "undergrowth", "grass_tufts", "trees", "boulders")
 
+    focus_disparity_share: Range = (0.018, 0.064)
+    """Disparity at the unit of depth, log-uniform, as a share of the image width (0.018 is 17 px at 960); it sets the
+    baseline. In most scenes the main creature stands at the unit of depth."""
     creatures: Count = (1, 4)
-    """Creatures per scene; the first is the main one, at which the camera looks."""
+    """Creatures per scene that has any; the first is the main one, at which the camera looks. Groups have up to two
+    more."""
     focus_distance_m: Range = (2.5, 6.0)
-    """Distance of the main creature."""
+    """Depth at which the baseline is set, where the main creature stands in most scenes."""
     fur_locks: Count = (2000, 5500)
     """Locks of fur on a furry creature; three in four are furry, the others have bare skin."""
     undergrowth: Count = (30, 60)
@@ -84,29 +106,43 @@ class _Plan:
     """Decisions that come before anything is placed."""
 
     place: str
+    framing: Framing
     depth_m: float
-    """Depth of the main creature; the unit of all lengths."""
+    """Depth at which the baseline is set, where the main creature stands in most scenes; the unit of all lengths."""
     size_m: float
-    """Its height."""
+    """Height of the main creature."""
     placement: GroundPlacement
+    shares: Shares
+
+    @property
+    def focus_m(self) -> float:
+        """Depth of the main creature."""
+        return self.framing.first_depth * self.depth_m
 
 
 def sample_monkaa(rng: np.random.Generator, config: MonkaaConfig) -> Scene:
     """Draw one scene."""
-    plan = _sample_plan(rng, config)
+    plan, land = _sample_plan(rng, config)
     placement = plan.placement
     sky = Sky.sample(rng, 1024)
-    placement.lay_ground(rng, _floor(plan.place), 1.5 * plan.depth_m)
+    placement.lay_ground(rng, _floor(plan.place), plan.depth_m)
+    add_water(rng, placement, land, plan.depth_m)
     cave = _cave(rng, plan) if plan.place == "cave" else None
     creatures = _creatures(rng, config, plan)
     area = VegetationArea(placement, plan.depth_m, anywhere if cave is None else cave.contains)
+    nearest_m = placement.clearance_m
+    near = add_foreground(
+        rng, placement, plan.shares, _NEAR[plan.place], integer(rng, *config.foreground),
+        (1.05 * nearest_m, max(1.3 * nearest_m, 0.75 * plan.depth_m)),
+    )  # fmt: skip
     _FURNISH[plan.place](rng, config, plan)
     foliage = [leaves() for _ in range(4)]
     if chance(rng, 0.5):
         foliage.append(leaves(VIVID))
     undergrowth(rng, area, integer(rng, *config.undergrowth), foliage)
     grass(rng, area, integer(rng, *config.grass_tufts), (FOLIAGE, FOLIAGE, DRY_GRASS))
-    boulders(rng, area, "boulder", integer(rng, *config.boulders), (rock(), rock()))
+    boulders(rng, area, "boulder", integer(rng, *config.boulders), (rock(), rock()), plan.shares)
+    scree(rng, area, integer(rng, 2, 8), rock(ROCK, EARTH))
     base = Scene(
         family="monkaa",
         frames=config.frames,
@@ -115,23 +151,34 @@ def sample_monkaa(rng: np.random.Generator, config: MonkaaConfig) -> Scene:
         materials=(),
         lights=_lights(rng, config, plan, cave),
         world=World(sky, uniform(rng, *config.sky_strength)),
-        exposure_key=uniform(rng, 0.2, 0.32),
+        exposure_key=uniform(rng, 0.17, 0.28),
         final=sample_final(
-            rng, plan.depth_m, linear(sky.horizon), config.fog_share, (2.5 * plan.depth_m, 20 * plan.depth_m)
+            rng, plan.focus_m, linear(sky.horizon), config.fog_share, (2.5 * plan.focus_m, 20 * plan.focus_m)
         ),
-        notes={"creatures": float(creatures), "place": float(PLACES.index(plan.place))},
+        notes={
+            "creatures": float(creatures),
+            "place": float(PLACES.index(plan.place)),
+            "framing": plan.framing.note,
+            "near_things": float(near),
+            "water": float(land.shape.basin is not None),
+        },
     )
     return placement.scene(base)
 
 
-def _sample_plan(rng: np.random.Generator, config: MonkaaConfig) -> _Plan:
+def _sample_plan(rng: np.random.Generator, config: MonkaaConfig) -> tuple[_Plan, Land]:
     place = "cave" if chance(rng, config.cave_share) else choose(rng, PLACES[:3], (0.45, 0.3, 0.25))
     depth_m, focal_mm = uniform(rng, *config.focus_distance_m), config.lens_mm(uniform(rng, *config.focal_mm))
-    size_m = uniform(rng, *config.focus_height_share) * 2 * half_height(focal_mm, config) * depth_m
+    framing = sample_framing(rng, config, config.creatures)
+    size_m = framing.height_share * 2 * half_height(focal_mm, config) * depth_m
     land = _sample_land(rng, place, depth_m)
-    focus = sample_focus(rng, config, focal_mm, depth_m, size_m, uniform(rng, 0.45, 1.1) * size_m)
+    if chance(rng, config.water_share):
+        land = with_pond(rng, land, depth_m, framing.first_depth * depth_m)
+    high_m = uniform(rng, *framing.eye) * size_m
+    focus = sample_focus(rng, config, focal_mm, depth_m, size_m, high_m, framing.aim, framing.above)
     camera = sample_camera(rng, config, land, focus)
-    return _Plan(place, depth_m, size_m, GroundPlacement(land, camera, config.frames, 1.15 * focus.nearest_m))
+    placement = GroundPlacement(land, camera, config.frames, 1.15 * focus.nearest_m, land.water_m)
+    return _Plan(place, framing, depth_m, size_m, placement, config.shares), land
 
 
 def _sample_land(rng: np.random.Generator, place: str, depth_m: float) -> Land:
@@ -161,36 +208,31 @@ def _floor(place: str) -> TextureSampler:
 
 def _creatures(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> int:
     """The main creature before the camera, the others about it; returns how many were placed."""
-    placement, placed = plan.placement, 0
-    for index in range(integer(rng, *config.creatures)):
-        furry = chance(rng, 0.75)
-        character = sample_creature(
-            rng,
-            Coat(
-                tufts=integer(rng, *config.fur_locks) if furry else 0,
-                tuft_length=log_uniform(rng, 0.028, 0.075),
-                cells=54 if index == 0 else 40,
-            ),
+    placement, framing, placed = plan.placement, plan.framing, 0
+    for index in range(framing.characters):
+        furry = chance(rng, 0.7)
+        coat = Coat(
+            tufts=integer(rng, *config.fur_locks) if furry else 0,
+            tuft_length=log_uniform(rng, 0.028, 0.075),
+            cells=54 if index == 0 else 40,
         )
+        character = sample_creature(rng, coat)
         size_m = plan.size_m if index == 0 else plan.size_m * log_uniform(rng, 0.4, 1.1)
         scale_m = size_m / max(character.height, 0.75 * character.reach)
-        if index == 0:
-            right = uniform(rng, -0.35, 0.35)
-            spot = placement.spot(right, plan.depth_m, _towards_camera(rng, 1.0))
-        else:
-            spot = placement.spot(
-                uniform(rng, -0.85, 0.85), plan.depth_m * uniform(rng, 0.85, 2.6), _towards_camera(rng, 2.2)
-            )
-        materials = _creature_materials(
-            rng, placement, character, fur if furry else hide, scale_m, spot.depth_m
-        )
+        right = uniform(rng, -0.45, 0.45)
+        spot = placement.spot(right, plan.focus_m, _towards_camera(rng, 1.2))
+        if index > 0:
+            near, beyond = (depth * plan.depth_m for depth in framing.other_depths)
+            across = uniform(rng, -framing.spread, framing.spread)
+            spot = placement.spot(across, log_uniform(rng, near, beyond), _towards_camera(rng, 2.2))
+        materials = _creature_materials(rng, plan, character, furry, scale_m, spot.depth_m)
         # The main creature is not checked: the camera was set up for it.
         placed += place_character(
             placement, f"creature {index}", character, materials, spot, scale_m, checked=index > 0
         )
         if index == 0:
-            wide = character.reach * scale_m / (plan.depth_m * placement.view.half_view[0])
-            placement.keep_view_free(right, 0.7 * wide, plan.depth_m)
+            wide = character.reach * scale_m / (plan.focus_m * placement.view.half_view[0])
+            placement.keep_view_free(right, 0.6 * wide, plan.focus_m)
     return placed
 
 
@@ -199,22 +241,21 @@ def _towards_camera(rng: np.random.Generator, spread_rad: float) -> float:
 
 
 def _creature_materials(
-    rng: np.random.Generator,
-    placement: GroundPlacement,
-    character: Character,
-    coat: TextureSampler,
-    scale_m: float,
-    depth_m: float,
+    rng: np.random.Generator, plan: _Plan, character: Character, furry: bool, scale_m: float, depth_m: float
 ) -> dict[str, int]:
-    half_m = 0.5 * scale_m
-    gloss = 0.0 if coat is fur or chance(rng, 0.5) else 0.4
-    materials = {
-        "fur": placement.new_material(rng, coat, half_m, depth_m, gloss=gloss),
-        "eye": placement.new_material(rng, eye, half_m, depth_m, size=128, gloss=0.5),
+    looks = {
+        "fur": CHARACTER_SURFACES["fur" if furry else "hide"](rng, plan.shares),
+        "eye": CHARACTER_SURFACES["eye"](rng, plan.shares),
     }
     if any(part.material == "horn" for part in character.parts):
-        materials["horn"] = placement.new_material(rng, horn, 0.2 * half_m, depth_m, size=128)
-    return materials
+        looks["horn"] = CHARACTER_SURFACES["horn"](rng, plan.shares)
+    sizes = {"fur": (0.5, 256), "eye": (0.5, 128), "horn": (0.1, 128)}
+    return {
+        name: plan.placement.new_material(
+            rng, look.texture, sizes[name][0] * scale_m, depth_m, size=sizes[name][1], finish=look.finish
+        )
+        for name, look in looks.items()
+    }
 
 
 def _jungle(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
@@ -233,15 +274,15 @@ def _meadow(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None
     count = max(2, integer(rng, *config.trees) // 2)
     trees(rng, area, kinds, count, (2.5, 12.0), (0.7, 1.6), [leaves()] * 2)
     _thicket(rng, area, integer(rng, 8, 16), (5.0, 13.0), 0.8)
-    mushrooms(rng, area, "toadstool", integer(rng, 4, 12), (0.8, 4.0), (0.08, 0.25), 0.0)
+    mushrooms(rng, area, "toadstool", integer(rng, 4, 12), (0.8, 4.0), (0.08, 0.25), 0.0, plan.shares)
 
 
 def _grove(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
     """Mushrooms as large as trees, small ones between them."""
     area = VegetationArea(plan.placement, plan.depth_m)
     glow = uniform(rng, 0.1, 0.6) if chance(rng, 0.3) else 0.0
-    mushrooms(rng, area, "giant", integer(rng, *config.trees), (1.6, 9.0), (0.5, 2.2), glow)
-    mushrooms(rng, area, "toadstool", integer(rng, 12, 26), (0.8, 4.0), (0.06, 0.4), glow)
+    mushrooms(rng, area, "giant", integer(rng, *config.trees), (1.6, 9.0), (0.5, 2.2), glow, plan.shares)
+    mushrooms(rng, area, "toadstool", integer(rng, 12, 26), (0.8, 4.0), (0.06, 0.4), glow, plan.shares)
     _thicket(rng, area, integer(rng, 10, 18), (5.0, 12.0), 0.9)
 
 
@@ -258,9 +299,18 @@ def _cave_inside(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) ->
         else:
             placement.hang(f"stalactite {index}", shape, stone, spot, 1.3 * _CAVE_RADIUS * d, scale_m)
     area = VegetationArea(placement, d)
-    mushrooms(rng, area, "toadstool", integer(rng, 6, 16), (0.8, 4.0), (0.08, 0.35), uniform(rng, 0.3, 2.0))
+    glow = uniform(rng, 0.3, 1.5)
+    mushrooms(rng, area, "toadstool", integer(rng, 6, 16), (0.8, 4.0), (0.08, 0.35), glow, plan.shares)
 
 
+_PLANTS: dict[PropSampler, float] = {smooth_boulder: 1.0, broad_leaves: 2.0, toadstool: 1.5, outcrop: 1.0}
+_NEAR: dict[str, dict[PropSampler, float]] = {
+    "jungle": _PLANTS | {trunk: 1.5, paling: 1.0},
+    "meadow": _PLANTS | {paling: 2.0, vessel: 1.0},
+    "mushrooms": _PLANTS | {toadstool: 4.0, crystals: 1.0, vessel: 1.0},
+    "cave": {smooth_boulder: 2.0, outcrop: 2.0, crystals: 3.0, toadstool: 1.5, vessel: 0.5},
+}
+"""What stands near the camera in a place, and how often."""
 _FURNISH = {"jungle": _jungle, "meadow": _meadow, "mushrooms": _grove, "cave": _cave_inside}
 
 _CAVE_RADIUS = 1.35
@@ -347,7 +397,7 @@ def _lights(
 ) -> tuple[Light, ...]:
     """A sun, and coloured lamps about the creature; in a cave the lamps hang under its roof."""
     placement, d = plan.placement, plan.depth_m
-    target = placement.spot(0.0, d).ground_m + np.array((0.0, 0.0, 0.5 * plan.size_m))
+    target = placement.spot(0.0, plan.focus_m).ground_m + np.array((0.0, 0.0, 0.5 * plan.size_m))
     lights: list[Light] = [sample_sun(rng, placement.pose)]
     for index in range(integer(rng, *config.lamps) + (1 if cave else 0)):
         if cave is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.geometry import kernels
 from scenes.geometry.building import Triangles, Vertices
 from stereoforge_kit.errors import InputError
 
@@ -31,10 +32,6 @@ def capsule_distances(
     return signed
 
 
-_CHUNK = 4096
-"""Points at a time: their distances to all capsules fit into a core's cache, which is three times as fast."""
-
-
 def blended_capsules(
     points: NDArray[np.float64],
     start: NDArray[np.float64],
@@ -47,12 +44,7 @@ def blended_capsules(
 
     It is -blend * log(sum(exp(-distance / blend))). The other arguments are those of `capsule_distances`.
     """
-    field = np.empty(len(points))
-    for first in range(0, len(points), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        distances = capsule_distances(points[part], start, end, start_radius, end_radius)
-        nearest = distances.min(axis=1)
-        field[part] = nearest - blend * np.log(np.exp((nearest[:, None] - distances) / blend).sum(axis=1))
+    field: NDArray[np.float64] = kernels.blended_capsules(points, start, end, start_radius, end_radius, blend)
     return field
 
 

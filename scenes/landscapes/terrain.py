@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from scenes.appearance.room_materials import Shares
 from scenes.family import FamilyConfig
 from scenes.motion.trajectories import KEY_SPACING_FRAMES, vector, wander
-from scenes.random_draws import Range, chance, log_uniform, uniform
+from scenes.random_draws import Count, Range, chance, log_uniform, uniform
 from scenes.shapes.nature.landforms import Landscape
 from scenes.spec import SENSOR_WIDTH_MM, Color, FinalPass, Fog, StereoCamera
 from stereoforge_kit.errors import InputError
-
-NEAREST_SHARE = 0.105
-"""Disparity of the nearest surface allowed, as a share of the image width: 101 px at 960."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +25,33 @@ class LandscapeConfig(FamilyConfig):
 
     focal_mm: Range = (18.0, 60.0)
     """Focal length on a sensor 32 mm wide."""
-    focus_disparity_share: Range = (0.014, 0.052)
-    """Disparity of the main character, as a share of the image width (0.016 is 15 px at 960);
-    it sets the baseline."""
-    focus_height_share: Range = (0.45, 0.8)
-    """Height of that character, as a share of the image height."""
+    focus_disparity_share: Range = (0.026, 0.085)
+    """Disparity at the unit of depth, log-uniform, as a share of the image width (0.026 is 25 px at 960); it sets the
+    baseline. In most scenes the main character stands at the unit of depth."""
+    largest_disparity_share: float = 0.19
+    """No surface in view has a larger disparity than about this share of the image width: 182 px at 960."""
+    focus_height_share: Range = (0.4, 0.8)
+    """Height of the main character, as a share of the image height, where it is neither near nor far."""
+    near_share: float = 0.18
+    """Share of the scenes that see the main character from close by, cut off by the image's edge, 0..1."""
+    far_share: float = 0.18
+    """Share of the scenes with characters in the distance, 0..1."""
+    several_share: float = 0.22
+    """Share of the scenes with a group, 0..1."""
+    empty_share: float = 0.1
+    """Share of the scenes without characters, 0..1."""
+    foreground: Count = (1, 4)
+    """Things that are tried for between the camera and the main character, beside its line of sight."""
+    water_share: float = 0.3
+    """Share of the scenes with a pond or pool, where the place has water, 0..1. Ground truth is of its surface."""
+    plain_share: float = 0.35
+    """How many of the cloths, hides, caps, boulders and walls that come both ways are of one colour."""
+    glossy_share: float = 0.25
+    """How many of the surfaces that come both ways are wet, waxed, glazed or polished."""
+    metallic_share: float = 0.75
+    """How many of the arms and vessels are bare metal; the others are painted."""
+    transparent_share: float = 0.65
+    """How many of the things of glass, ice and crystal are clear. Ground truth is of their surface."""
     camera_speed: Range = (0.0, 0.015)
     """Speed of the camera, as a share of the character's distance per frame."""
     camera_turn_deg: Range = (0.0, 0.5)
@@ -46,8 +66,20 @@ class LandscapeConfig(FamilyConfig):
         for name in ("focal_mm", "focus_disparity_share", "focus_height_share"):
             if getattr(self, name)[0] <= 0:
                 raise InputError(f"{name} must be above 0, got {getattr(self, name)}")
-        if self.focus_disparity_share[1] > NEAREST_SHARE / 2:
-            raise InputError(f"focus_disparity_share must not exceed {NEAREST_SHARE / 2}")
+        if not self.focus_disparity_share[1] <= self.largest_disparity_share / 2 < 0.5:
+            raise InputError(
+                f"focus_disparity_share must not exceed half of largest_disparity_share, which must be below 1; got "
+                f"{self.focus_disparity_share} and {self.largest_disparity_share}"
+            )
+        if self.near_share + self.far_share + self.several_share + self.empty_share > 1 + 1e-9:
+            raise InputError(
+                "near_share, far_share, several_share and empty_share must not exceed 1 together"
+            )
+
+    @property
+    def shares(self) -> Shares:
+        """How many surfaces are plain, glossy, bare metal and clear."""
+        return Shares(self.plain_share, self.glossy_share, self.metallic_share, self.transparent_share)
 
 
 @dataclass(frozen=True)
@@ -57,6 +89,8 @@ class Land:
     shape: Landscape
     half_m: float
     """Half the side of the square it covers."""
+    water_m: float = -math.inf
+    """World z of the water in its basin."""
 
     @cached_property
     def _heights_m(self) -> NDArray[np.float64]:
@@ -102,11 +136,15 @@ class Focus:
     """Of the camera, a frame."""
     turn_deg: float
     """Of the camera, a frame."""
+    largest_share: float
+    """`LandscapeConfig.largest_disparity_share`."""
+    aim: float = 0.5
+    """Height at which the camera looks, relative to the subject's."""
 
     @property
     def nearest_m(self) -> float:
         """Depth at which the disparity would be the largest allowed."""
-        return self.depth_m * self.disparity_share / NEAREST_SHARE
+        return self.depth_m * self.disparity_share / self.largest_share
 
 
 def sample_camera(
@@ -123,8 +161,8 @@ def sample_camera(
     circle = np.stack([np.cos(angle), np.sin(angle)], -1)
     around = np.concatenate([circle * share for share in (0.0, 0.5, 1.0)]) * (reach_m + baseline_m)
     above_m = max(focus.camera_height_m, reach_m + 0.4 * focus.camera_height_m)
-    eye_m = float(land.height_m(around).max()) + above_m
-    target_m = float(land.height_m(np.array([[0.0, focus.depth_m]]))[0]) + 0.5 * focus.size_m
+    eye_m = max(float(land.height_m(around).max()), land.water_m) + above_m
+    target_m = float(land.height_m(np.array([[0.0, focus.depth_m]]))[0]) + focus.aim * focus.size_m
     pitch_deg = math.degrees(math.atan2(eye_m - target_m, focus.depth_m)) - focus.above_deg
     motion = wander(
         rng,
@@ -153,26 +191,32 @@ def sample_focus(
     depth_m: float,
     size_m: float,
     camera_height_m: float,
+    aim: float = 0.5,
+    above: Range = (-0.05, 0.3),
 ) -> Focus:
     """How a camera sees a subject about mid-image, of a size, at a depth, from about a height.
 
     A rig of the user's own decides the disparity. The camera is raised where the image's lower edge would otherwise
-    show ground nearer than allowed.
+    show ground nearer than allowed. It looks at the height `aim`, relative to the subject's, or `above` it by a part of
+    half the field of view.
     """
-    share = uniform(rng, *config.focus_disparity_share)
+    share = log_uniform(rng, *config.focus_disparity_share)
     if config.rig:
         share = config.rig.fx * config.rig.baseline_m / (depth_m * config.width)
     half_high = half_height(focal_mm, config)
-    height_m = max(camera_height_m, 1.3 * (half_high + 0.1) * depth_m * share / NEAREST_SHARE)
+    largest = config.largest_disparity_share
+    height_m = max(camera_height_m, 1.3 * (half_high + 0.1) * depth_m * share / largest)
     return Focus(
         depth_m=depth_m,
         size_m=size_m,
         disparity_share=share,
         camera_height_m=height_m,
-        above_deg=uniform(rng, -0.05, 0.3) * math.degrees(half_high),
+        above_deg=uniform(rng, *above) * math.degrees(half_high),
         focal_mm=focal_mm,
         speed_m=uniform(rng, *config.camera_speed) * depth_m,
         turn_deg=uniform(rng, *config.camera_turn_deg),
+        largest_share=largest,
+        aim=aim,
     )
 
 

@@ -14,13 +14,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from scenes.appearance.material_textures import TextureSampler, bark, cap, horn, leaves
+from scenes.appearance.landscape_materials import cap, gloss_or_matte
+from scenes.appearance.material_textures import TextureSampler, bark, horn, leaves
 from scenes.appearance.palettes import FOLIAGE, PaletteRange
+from scenes.appearance.room_materials import Shares
 from scenes.placement.ground import GroundPlacement, Spot, sway_of
 from scenes.random_draws import Range, choose, log_uniform, uniform
 from scenes.shapes.anchored import PartedShape
 from scenes.shapes.nature.landforms import Boulder
 from scenes.shapes.nature.plants import GrassTuft, Mushroom, sample_undergrowth
+from scenes.shapes.nature.rocks import Outcrop, Scree
 from scenes.spec import Shape
 
 T = TypeVar("T")
@@ -163,13 +166,18 @@ def mushrooms(
     depths: Range,
     scales: Range,
     glow: float,
+    shares: Shares,
 ) -> None:
     """Mushrooms of a few kinds; `glow` is the emission of their caps (`Material.emission`)."""
     placement, unit_m = area.placement, area.unit_m
     kinds = [Mushroom.sample(rng) for _ in range(5)]
     middle_m, seen_m = math.sqrt(scales[0] * scales[1]) * unit_m, 1.5 * depths[0] * unit_m
     pale = placement.new_material(rng, horn, middle_m, seen_m)
-    caps = [placement.new_material(rng, cap, middle_m, seen_m, emission=glow) for _ in range(3)]
+    looks = [cap(rng, shares) for _ in range(3)]
+    caps = [
+        placement.new_material(rng, look.texture, middle_m, seen_m, finish=look.finish, emission=glow)
+        for look in looks
+    ]
     pairs = _pairings(rng, kinds, caps)
     for index, spot in enumerate(area.spots(rng, count, depths, 1.1)):
         kind, top = choose(rng, pairs)
@@ -183,17 +191,43 @@ def boulders(
     name: str,
     count: int,
     stones: Sequence[TextureSampler],
+    shares: Shares,
     depths: Range = (0.7, 8.0),
     scales: Range = (0.04, 0.35),
     sunk: Range = (0.2, 0.6),
 ) -> None:
-    """Stones, sunk into the ground by `sunk` relative to their scale."""
+    """Boulders and bedded rocks, sunk into the ground by `sunk` relative to their scale."""
     placement, unit_m = area.placement, area.unit_m
-    kinds = [replace(Boulder.sample(rng), detail=3) for _ in range(4)]
+    kinds: list[Shape] = [replace(Boulder.sample(rng), detail=3) for _ in range(3)]
+    kinds += [Outcrop.sample(rng) for _ in range(2)]
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
-    rocks = [placement.new_material(rng, sampler, middle_m, 1.8 * depths[0] * unit_m) for sampler in stones]
+    finishes = [gloss_or_matte(rng, shares) for _ in stones]
+    rocks = [
+        placement.new_material(rng, sampler, middle_m, 1.8 * depths[0] * unit_m, finish=finish)
+        for sampler, finish in zip(stones, finishes, strict=True)
+    ]
     pairs = _pairings(rng, kinds, rocks)
     for index, spot in enumerate(area.spots(rng, count, depths, 1.15)):
         (shape, material), scale_m = choose(rng, pairs), log_uniform(rng, *scales) * unit_m
         sunk_m = scale_m * uniform(rng, *sunk)
-        placement.stand(f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk_m)
+        placement.stand(f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk_m, wades=True)
+
+
+def scree(
+    rng: np.random.Generator,
+    area: VegetationArea,
+    count: int,
+    stones: TextureSampler,
+    depths: Range = (0.3, 3.0),
+    scales: Range = (0.1, 0.4),
+) -> None:
+    """Patches of small stones, which give plain ground structure near the camera."""
+    placement, unit_m = area.placement, area.unit_m
+    kinds = [Scree.sample(rng) for _ in range(3)]
+    middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
+    rocks = [placement.new_material(rng, stones, middle_m, unit_m) for _ in range(2)]
+    pairs = _pairings(rng, kinds, rocks)
+    for index, spot in enumerate(area.spots(rng, count, depths, 1.1)):
+        shape, material = choose(rng, pairs)
+        scale_m = log_uniform(rng, *scales) * unit_m
+        placement.stand(f"scree {index}", shape, material, spot, scale_m, on_lowest=True, wades=True)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.appearance.material_textures import TextureSampler
-from scenes.appearance.materials import texture_repeats
+from scenes.appearance.materials import FINISHES, Finish, texture_repeats
 from scenes.motion.deformations.sway import Sway
 from scenes.placement.assembly import Assembly, anchored_object
 from scenes.placement.boxes import OrientedBox
@@ -73,17 +73,30 @@ class Spot:
 class GroundPlacement(Assembly):
     """A scene that is being assembled on ground, before a camera."""
 
-    def __init__(self, ground: Ground, camera: StereoCamera, frames: int, clearance_m: float) -> None:
-        """Nothing that is checked comes nearer than `clearance_m` to either camera."""
+    def __init__(
+        self,
+        ground: Ground,
+        camera: StereoCamera,
+        frames: int,
+        clearance_m: float,
+        water_m: float = -math.inf,
+    ) -> None:
+        """Nothing that is checked comes nearer than `clearance_m` to either camera, or stands in water.
+
+        `water_m` is the world z of the water's surface.
+        """
         super().__init__()
+        self.water_m = water_m
         self.ground, self.frames = ground, frames
         self.view = View(camera, frames)
         self.pose = self.view.pose
         """(4, 4) from the left camera to the world, half way through the scene."""
-        self._clearance_m = clearance_m
+        self.clearance_m = clearance_m
         self._cameras = camera_positions(camera, frames)
         self._kept_free: list[tuple[float, float, float]] = []
         """Image columns (low, high, -1..1) before which nothing may stand, up to a depth in metres."""
+        self._occupied: list[tuple[NDArray[np.float64], float]] = []
+        """World points (N, 3), and how near to them nothing may come."""
 
     def new_material(
         self,
@@ -93,13 +106,13 @@ class GroundPlacement(Assembly):
         depth_m: float,
         *,
         size: int = 256,
-        gloss: float = 0.0,
+        finish: Finish = FINISHES["matte"],
         emission: float = 0.0,
     ) -> int:
         """The index of a new material for things that stand at about `depth_m`.
 
         A unit of their texture coordinates is `unit_m` long; the texture, `size` pixels wide, repeats so that
-        its pixels are about as large as the image's. `gloss` is the strength of the highlight, 0..1.
+        its pixels are about as large as the image's.
         """
         texture = texture_sampler(rng, size)
         unit_px = unit_m * self.view.camera.focal_px / depth_m
@@ -107,8 +120,10 @@ class GroundPlacement(Assembly):
             Material(
                 color=texture,
                 repeats=max(texture_repeats(rng, unit_px, size, _TEXEL_PX), 0.05),
-                roughness=1.0 if gloss == 0.0 else 0.35,
-                specular=gloss,
+                roughness=uniform(rng, *finish.roughness),
+                specular=uniform(rng, *finish.specular),
+                metallic=uniform(rng, *finish.metallic),
+                transmission=uniform(rng, *finish.transmission),
                 emission=emission,
             )
         )
@@ -127,6 +142,10 @@ class GroundPlacement(Assembly):
         depth = float((self.pose[:3, 3] - place) @ self.pose[:3, 2])
         return Spot(place, depth, heading_rad)
 
+    def is_wet(self, spot: Spot) -> bool:
+        """Whether a spot is under water."""
+        return bool(spot.ground_m[2] < self.water_m)
+
     def random_spot(
         self, rng: np.random.Generator, depths_m: tuple[float, float], spread: float = 1.25
     ) -> Spot:
@@ -139,6 +158,10 @@ class GroundPlacement(Assembly):
         """Let nothing stand before what is at an image column (-1..1) and a depth."""
         self._kept_free.append((right - half_width, right + half_width, depth_m))
 
+    def occupy(self, points_m: NDArray[np.float64], radius_m: float) -> None:
+        """Let nothing that is checked come nearer than `radius_m` to world points (N, 3) from now on."""
+        self._occupied.append((points_m, radius_m))
+
     def box_of(
         self, shape: Shape, spot: Spot, unit_m: float, sunk_m: float = 0.0, lean: Rotation | None = None
     ) -> OrientedBox:
@@ -150,7 +173,9 @@ class GroundPlacement(Assembly):
 
     def allows(self, box: OrientedBox) -> bool:
         """Whether a thing in this box leaves the cameras and the view of the subject free."""
-        if box.distance(self._cameras) < self._clearance_m:
+        if box.distance(self._cameras) < self.clearance_m:
+            return False
+        if any(box.distance(points) < radius_m for points, radius_m in self._occupied):
             return False
         local = (box.corners - self.pose[:3, 3]) @ self.pose[:3, :3]
         depth = -local[:, 2]
@@ -181,15 +206,18 @@ class GroundPlacement(Assembly):
         deformation: Deformation | None = None,
         on_lowest: bool = False,
         checked: bool = True,
+        wades: bool = False,
     ) -> bool:
         """Stand a shape on the ground by its anchor; False if it may not stand there.
 
         A unit of its built coordinates is `unit_m` long. `sunk_m` is how deep it stands in the ground, `lean`
         a rotation before its heading is applied. `on_lowest` sinks broad things to the lowest ground under
-        them, so that no corner hangs free. What is not `checked` may stand anywhere.
+        them, so that no corner hangs free. What is not `checked` may stand anywhere, what `wades` also in water.
         """
         if on_lowest:
             sunk_m += self._fall_below(shape, spot, unit_m)
+        if checked and not wades and self.is_wet(spot):
+            return False
         if checked and not self.allows(self.box_of(shape, spot, unit_m, sunk_m, lean)):
             return False
         foot = spot.ground_m - (0.0, 0.0, sunk_m)
@@ -211,7 +239,7 @@ class GroundPlacement(Assembly):
     ) -> bool:
         """Stand the parts of one thing together, each in the material of its name; all of them or none."""
         sunk_m = self._fall_below(shape, spot, unit_m) if on_lowest else 0.01 * unit_m
-        if not self.allows(self.box_of(shape, spot, unit_m, sunk_m)):
+        if self.is_wet(spot) or not self.allows(self.box_of(shape, spot, unit_m, sunk_m)):
             return False
         for part in (replace(shape, only=part_name) for part_name in shape.part_names()):
             material = materials[part.only]

@@ -98,7 +98,7 @@ class AnchoredShape(Shape):
         )
 
 
-@lru_cache(maxsize=48)
+@lru_cache(maxsize=192)
 def _parts_of(shape: PartedShape) -> dict[str, Part]:
     """The parts of a shape; kept for a while, because placing it and building each part ask again."""
     parts = shape.parts()

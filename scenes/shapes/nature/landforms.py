@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import ClassVar, Self
 
@@ -15,7 +15,7 @@ from scenes.random_draws import chance, integer, log_uniform, new_seed, uniform
 from scenes.shapes.anchored import PartedShape
 from scenes.shapes.solids.basic import sample_proportions
 from scenes.shapes.solids.organic import wave_noise
-from scenes.spec import Shape, Vector
+from scenes.spec import OMIT_DEFAULT, Shape, Vector
 
 
 def eroded_relief(
@@ -46,6 +46,30 @@ def eroded_relief(
 
 
 @dataclass(frozen=True)
+class Basin:
+    """A hollow in the land with an elliptical rim: the bed of a pond. Lengths are relative to half the land's side."""
+
+    x: float
+    y: float
+    long: float
+    """Half its length."""
+    wide: float
+    """Half its width."""
+    heading_rad: float
+    """Of its length, from the x axis towards the y axis."""
+    depth: float
+
+    def rim_shares(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N,) where points (N, 2) are: 0 in the middle, 1 on the rim, more outside."""
+        x, y = (points - (self.x, self.y)).T
+        cos, sin = np.cos(self.heading_rad), np.sin(self.heading_rad)
+        shares: NDArray[np.float64] = np.hypot(
+            (x * cos + y * sin) / self.long, (y * cos - x * sin) / self.wide
+        )
+        return shares
+
+
+@dataclass(frozen=True)
 class Landscape(Shape):
     """A block of land: a level clearing in the middle, eroded hills or mountains about it.
 
@@ -67,6 +91,8 @@ class Landscape(Shape):
     concentration: float
     """1: equal cells; 3: those in the middle are much smaller than those at the rim."""
     seed: int
+    basin: Basin | None = field(default=None, metadata=OMIT_DEFAULT)
+    """The bed of a pond; None for dry land."""
 
     popularity: ClassVar[float] = 0.3
 
@@ -104,6 +130,8 @@ class Landscape(Shape):
         rise = rise * rise * (3 - 2 * rise)
         uneven = self.roll * wave_noise(rng, points, 3.0 / max(self.clearing, 0.05), 1.2)
         height = self.relief * rise * (0.25 + 0.75 * hills) + uneven
+        if self.basin is not None:
+            height -= self.basin.depth * np.clip(1.0 - self.basin.rim_shares(points) ** 2, 0.0, None) ** 0.7
         return (height[:-1] - height[-1]).reshape(x.shape)
 
     def middle_height(self) -> float:

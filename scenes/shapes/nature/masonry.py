@@ -239,6 +239,7 @@ class BlockWall(PartedShape):
             wave_noise(rng, np.linspace(0, 1, 4 * self.stones)[:, None], 4.0, 0.6)
         )
         standing = course < np.maximum(1, self.courses * skyline[(4 * place).astype(int) % (4 * self.stones)])
+        standing = _carried(course, place, standing)
         course, place = course[standing], place[standing]
         count = len(course)
         length = rng.uniform(0.40, 0.49, count)
@@ -267,6 +268,19 @@ class BlockWall(PartedShape):
         turn[:, 0, 1], turn[:, 1, 0] = -np.sin(heading), np.sin(heading)
         turn[:, 2, 2] = 1.0
         return {"stone": oriented_boxes(centre, half, turn)}
+
+
+def _carried(
+    course: NDArray[np.int64], place: NDArray[np.float64], standing: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(N,) the standing stones that rest on one below them, which rests on one below it, down to the ground."""
+    carried = standing & (course == 0)
+    for level in range(1, int(course.max()) + 1):
+        below = place[carried & (course == level - 1)]
+        here = np.flatnonzero(standing & (course == level))
+        if len(below) and len(here):
+            carried[here] = np.abs(place[here, None] - below).min(axis=1) < 0.75
+    return carried
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,9 @@ class SoftBody(PartedShape):
         points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
         distance = blended_capsules(points, start, end, radii[:, 0], radii[:, 1], self.blend)
         if self.folds > 0:
-            distance = distance + self._creases(points)
+            # Creases matter where the surface may be.
+            near = np.abs(distance) < 3.0 * self.folds + 2.0 * cell
+            distance[near] += self._creases(points[near])
         if self.floor is not None:
             distance = np.maximum(distance, self.floor - points[:, 2])
         vertices, triangles = surface_net(distance.reshape([len(axis) for axis in axes]))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from datagen.ground_truth.scene_geometry import build_geometry
 from scenes import sample_scene
 from scenes.families.sintel import SintelConfig
-from scenes.landscapes.terrain import NEAREST_SHARE
+from scenes.landscapes.framing import FRAMINGS
 from scenes.serialization import scene_from_json, scene_to_json
 from scenes.spec import Scene
 from tests.scenes.families.landscapes import (
@@ -29,7 +29,7 @@ SMALL = SintelConfig(
 )
 FEW = dataclasses.replace(SMALL, frames=24)
 seeds = st.integers(0, 2**32 - 1)
-ON_SOMETHING = ("leaves", "roof", "cap", "statue")
+ON_SOMETHING = ("leaves", "roof", "cap", "statue", "cloth")
 """Parts of things whose other parts stand on the ground."""
 
 
@@ -49,7 +49,7 @@ def test_the_same_seed_gives_the_same_scene_and_json_keeps_it() -> None:
 def test_neither_camera_is_ever_inside_or_near_anything(seed: int) -> None:
     scene = sampled(seed, FEW)
     geometry = build_geometry(scene)
-    closest = scene.camera.disparity_metres / (NEAREST_SHARE * scene.camera.width)
+    closest = scene.camera.disparity_metres / (SMALL.largest_disparity_share * scene.camera.width)
     for time in (0.0, 23.0):
         for view in ("left", "right"):
             position = scene.camera.pose(view, time)[:3, 3]
@@ -66,9 +66,9 @@ def test_what_stands_stands_on_the_ground_throughout(seed: int) -> None:
     standing = [
         index
         for index, thing in enumerate(scene.objects)
-        if thing.name != "ground"
+        if thing.name not in ("ground", "water")
         and not thing.name.endswith(ON_SOMETHING)
-        and (thing.name.split()[0] not in ("person", "beast") or {"leather", "fur"} & {*thing.name.split()})
+        and thing.name.split()[0] not in ("person", "beast")
     ]
     assert len(standing) > 8
     for time in (0.0, 17.0):
@@ -95,8 +95,9 @@ def test_masonry_stands_on_the_lowest_ground_under_it() -> None:
 
 def test_the_final_pass_is_focused_on_the_first_person_and_its_fog_fits_the_scene() -> None:
     foggy = 0
+    peopled = dataclasses.replace(SMALL, empty_share=0.0)
     for seed in range(12):
-        scene = sampled(seed)
+        scene = sampled(seed, peopled)
         body = next(thing for thing in scene.objects if thing.name.startswith("person 0 cloth"))
         camera = scene.camera.pose("left", 0.0)
         depth = float((body.pose(0.0)[:3, 3] - camera[:3, 3]) @ -camera[:3, 2])
@@ -116,22 +117,22 @@ def test_what_the_camera_sees_over_many_scenes() -> None:
         scene = sampled(seed)
         seen = first_hits(scene, build_geometry(scene))
         near = seen.disparity_960[seen.disparity_960 > 0]
-        assert near.max() < 1.15 * NEAREST_SHARE * 960
+        assert near.max() < 1.15 * SMALL.largest_disparity_share * 960
         share = np.bincount(seen.index[seen.index >= 0], minlength=len(scene.objects)) / seen.index.size
-        assert share[1:].max() < 0.6
+        assert share[1:].max() < 0.65
         assert share[0] < 0.95
         first = [k for k, thing in enumerate(scene.objects) if thing.name.startswith("person 0")]
-        seen_people += bool(share[first].sum() > 0.01)
+        seen_people += scene.notes["framing"] == FRAMINGS.index("none") or share[first].sum() > 0.002
         places.add(scene.notes["place"])
         sky.append(np.mean(seen.index < 0))
         disparities.append(near)
     assert seen_people >= 15
     assert len(places) >= 4
-    assert 0.05 < np.mean(sky) < 0.5
+    assert 0.03 < np.mean(sky) < 0.5
     low, middle, high = np.percentile(np.concatenate(disparities), (2, 50, 98))
     assert 0.1 < low < 6
-    assert 4 < middle < 35
-    assert 20 < high < 101
+    assert 10 < middle < 50
+    assert 50 < high < 182
 
 
 def test_bad_configs_are_refused() -> None:

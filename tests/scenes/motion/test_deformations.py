@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from scenes.landscapes.characters import Character, Coat, sample_creature
+from scenes.landscapes.characters import Character
+from scenes.landscapes.creatures import Coat, sample_creature
 from scenes.landscapes.people import sample_person
 from scenes.motion.deformations import DEFORMATIONS
 from scenes.motion.deformations.articulated import Articulated, Joint

@@ -16,6 +16,7 @@ from scenes.geometry.mesh import Mesh
 from scenes.serialization import from_plain, to_plain
 from scenes.shapes import SHAPES
 from scenes.shapes.anchored import MetricShape
+from scenes.shapes.nature.masonry import BlockWall
 from scenes.shapes.solids.basic import Box, Ellipsoid
 from scenes.shapes.solids.extruded import HoledPlate
 from scenes.shapes.solids.organic import Terrain
@@ -153,3 +154,15 @@ def test_the_middle_of_a_terrain_is_where_it_says() -> None:
     hits, ray, _ = rays.intersects_location(origins, np.tile([0.0, 0.0, -1.0], (50, 1)), multiple_hits=False)
     expected = terrain.height(points[ray]) + terrain.middle_height()
     np.testing.assert_allclose(hits[:, 2], expected, atol=0.01)
+
+
+def test_no_stone_of_a_ruined_wall_hangs_in_the_air() -> None:
+    for seed in range(30):
+        wall = BlockWall.sample(np.random.default_rng(seed))
+        stones = as_trimesh(wall.mesh()).split(only_watertight=False)
+        low, high = (np.array([stone.bounds[k] for stone in stones]) for k in (0, 1))
+        step = float(np.median(high[:, 2] - low[:, 2]))
+        for index in np.flatnonzero(low[:, 2] > low[:, 2].min() + 0.5 * step):
+            under = np.abs(high[:, 2] - low[index, 2]) < 0.5 * step
+            apart = np.maximum(low[index] - high[under], low[under] - high[index])[:, :2]
+            assert (apart < 0.1 * step).all(axis=1).any(), seed
