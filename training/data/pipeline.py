@@ -49,6 +49,8 @@ class Source:
     """How often it is drawn from, relative to the other sources' weights."""
     fingerprint: str = ""
     """What identifies the frames (`training.data.fingerprint`)."""
+    remarks: tuple[str, ...] = ()
+    """What the user should know of how the frames were found and read."""
 
 
 def read_pair(frame: StereoFrame) -> StereoPair:
