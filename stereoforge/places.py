@@ -13,6 +13,7 @@ from stereoforge_kit.messages import shortened
 
 _PREFIX = re.compile(r"\w+:(?!//)")
 _PART = re.compile(r"#\d+-\d+\Z")
+_OPTIONS = re.compile(r"(,[a-z]+=[^,]+)+\Z")
 _LONGEST = 60
 
 
@@ -58,5 +59,5 @@ def check_writable(flag: str, folder: Path) -> None:
 
 
 def _location(source: str) -> str:
-    """The folder or URL of `[FORMAT:]LOCATION[#FIRST-LAST]`."""
-    return _PREFIX.sub("", _PART.sub("", source), count=1)
+    """The folder or URL of `[FORMAT:]LOCATION[,OPTION=VALUE][#FIRST-LAST]`."""
+    return _PREFIX.sub("", _OPTIONS.sub("", _PART.sub("", source)), count=1)

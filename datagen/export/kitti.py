@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from datagen.dataset.samples import StereoDataset, StereoSample
 from datagen.export.lidar import lidar_mask
 from datagen.formats import write_png
-from datagen.formats.disparity import PNG_UNITS_PER_PX
+from datagen.formats.disparity import PNG_UNITS_PER_PX, to_units
 from datagen.sources.kitti import FRAME_LIST
 from scenes.shapes.street.vehicles import VEHICLE_PARTS
 from scenes.spec import Scene, StereoCamera
@@ -143,8 +143,7 @@ def encode_disparity(disparity: NDArray[np.float32], keep: NDArray[np.bool_]) ->
     """
     scaled = np.rint(np.nan_to_num(disparity).astype(np.float64) * PNG_UNITS_PER_PX)
     storable = keep & (disparity > 0) & (scaled <= np.iinfo(np.uint16).max)
-    # A valid disparity must not become invalid by rounding; KITTI's own writer raises it to 1 too.
-    return np.where(storable, np.maximum(scaled, 1), 0).astype(np.uint16)
+    return to_units(np.where(storable, disparity, np.nan), PNG_UNITS_PER_PX)
 
 
 def encode_flow(flow: NDArray[np.float32], keep: NDArray[np.bool_]) -> NDArray[np.uint16]:

@@ -108,6 +108,8 @@ class FileFrame:
     """Disparities that are less than at infinity by more than this are none."""
     find_disparity_at_infinity: Callable[[], float] = float
     """The disparity of what is infinitely far, 0 unless the views' principal points differ."""
+    origin: str = ""
+    """Where the frame is named, such as a line of a list; messages say it."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -118,12 +120,12 @@ class FileFrame:
     @cached_property
     def left(self) -> Picture:
         """(H, W, 3) uint8 sRGB."""
-        return self.read_left()
+        return self._read(self.read_left)
 
     @cached_property
     def right(self) -> Picture:
         """(H, W, 3) uint8 sRGB."""
-        return self._checked("right image", self.read_right())
+        return self._checked("right image", self.read_right)
 
     @property
     def disparity_left(self) -> DisparityMap:
@@ -140,7 +142,7 @@ class FileFrame:
         """(H, W) float32 px; None if the set has none."""
         if self.read_disparity_right is None:
             return None
-        disparity = self._checked("right disparity", self.read_disparity_right())
+        disparity = self._checked("right disparity", self.read_disparity_right)
         return self._possible(disparity)[0]
 
     @property
@@ -153,9 +155,7 @@ class FileFrame:
     @property
     def disparity_file(self) -> Path | None:
         """The file of the left disparity; None where it is a part of another one."""
-        read = self.read_disparity_left
-        paths = [value for value in read.args if isinstance(value, Path)] if isinstance(read, partial) else []
-        return paths[0] if paths else None
+        return _first_path(self.read_disparity_left)
 
     @property
     def gradient_left(self) -> NDArray[np.float32]:
@@ -171,7 +171,7 @@ class FileFrame:
     def occlusion_left(self) -> NDArray[np.uint8] | None:
         """(H, W) 0 visible in the right view, 1 occluded there, 2 out of its frame; None if it is not known."""
         if self.read_occlusion_left is not None:
-            return self._checked("occlusion", self.read_occlusion_left())
+            return self._checked("occlusion", self.read_occlusion_left)
         if self.disparity_right is None:
             return None
         return derive_occlusion("left", self.disparity_left, self.disparity_right)
@@ -181,18 +181,18 @@ class FileFrame:
         """(H, W) 0 where nothing is hit (sky), else the number of an object; None if the set has none."""
         if self.read_object_index_left is None:
             return None
-        return self._checked("object index", self.read_object_index_left())
+        return self._checked("object index", self.read_object_index_left)
 
     @cached_property
     def foreground_left(self) -> NDArray[np.uint16] | None:
         """(H, W) 0 background, else the number of a foreground object; None if the set does not tell."""
         if self.read_foreground_left is None:
             return None
-        return self._checked("foreground", self.read_foreground_left())
+        return self._checked("foreground", self.read_foreground_left)
 
     @cached_property
     def _disparity_left(self) -> tuple[DisparityMap, ImpossibleShare]:
-        disparity = self._checked("left disparity", self.read_disparity_left())
+        disparity = self._checked("left disparity", self.read_disparity_left)
         return self._possible(disparity)
 
     def _possible(self, disparity: DisparityMap) -> tuple[DisparityMap, ImpossibleShare]:
@@ -202,13 +202,31 @@ class FileFrame:
     def _gradient_left(self) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         return derive_gradient(self.disparity_left)
 
-    def _checked(self, what: str, array: NDArray[Any]) -> NDArray[Any]:
+    def _read(self, read: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+        try:
+            return read()
+        except DatasetError as error:
+            if not self.origin:
+                raise
+            raise type(error)(f"{error} ({self.origin})") from error
+
+    def _checked(self, what: str, read: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+        """What is read, if it has the size of the left image. Raises DatasetError, naming the file."""
+        array = self._read(read)
         if array.shape[:2] != self.size:
+            path = _first_path(read)
+            where = ", ".join(filter(None, (path and str(path), self.origin)))
             raise DatasetError(
                 f"{self.name}: its {what} is {array.shape[1]}x{array.shape[0]}, "
-                f"its left image {self.size[1]}x{self.size[0]}"
+                f"its left image {self.size[1]}x{self.size[0]}{where and f' ({where})'}"
             )
         return array
+
+
+def _first_path(read: Callable[[], Any]) -> Path | None:
+    """The file that a reader reads, as far as it says so."""
+    paths = [value for value in read.args if isinstance(value, Path)] if isinstance(read, partial) else []
+    return paths[0] if paths else None
 
 
 class FileFrames(Sequence[StereoFrame]):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
-from stereoforge.inputs.flag_values import check_max_disparity, shown
+from stereoforge.inputs.flag_values import check_disparity_scale, check_max_disparity, shown
 from stereoforge.inputs.images import pair_doubts
 from stereoforge.inputs.results_folder import claim_results
 from stereoforge.inputs.rig_flags import KnownRig, known_rig
@@ -64,11 +64,13 @@ class Refine:
     """Run folder with a regressor, a confnet and a gradnet, or with confnet_free and gradnet_free, which judge any
     predictor's disparity. paper: the bundled networks of the paper."""
     disparity: Annotated[Path | None, shown("FILE", "none")] = None
-    """Disparity of the left view in pixels to refine instead of predicting one: PFM or .npy, .npz
-    (NaN, infinite, negative or wider than the picture where there is none; int16 as OpenCV's matchers return it) or
-    16-bit PNG as KITTI has it (value / 256, 0 where there is none)."""
+    """Disparity of the left view in pixels to refine instead of predicting one: .pfm, .npy, .npz, .tiff or .exr (NaN,
+    infinite, negative or wider than the picture where there is none; int16 as OpenCV's matchers return it) or 16-bit
+    PNG as KITTI has it (value / 256, 0 where there is none)."""
     disparity_right: Annotated[Path | None, shown("FILE", "matched by SGBM")] = None
     """Disparity of the right view, which tells how far to trust the left one's."""
+    disparity_scale: Annotated[float | None, shown("S", "256 in 16-bit PNG, else 1")] = None
+    """--disparity and --disparity-right: value / S is the disparity in pixels."""
     predictor: Literal["networks", "sgbm"] = "networks"
     """What predicts the disparity: the run folder's networks, or OpenCV's semi-global matching."""
     max_disparity: Annotated[int | None, shown("PX", "chosen for the pictures")] = None
@@ -173,7 +175,7 @@ class Refine:
         size = (left.shape[0], left.shape[1])
         given: list[NDArray[np.float32] | None] = []
         for path in (self.disparity, self.disparity_right):
-            disparity, said = (None, []) if path is None else read_disparity(path, size)
+            disparity, said = (None, []) if path is None else read_disparity(path, size, self.disparity_scale)
             given.append(disparity)
             remarks += said
         refined = refiner(
@@ -202,6 +204,7 @@ class Refine:
 
     def _check(self) -> None:
         check_max_disparity(self.max_disparity)
+        check_disparity_scale(self.disparity_scale, "--disparity", self.disparity)
         if self.disparity is not None and self.predictor != "networks":
             raise UsageError("--disparity and --predictor sgbm both give the disparity; choose one")
         if self.disparity_right is not None and self.disparity is None:

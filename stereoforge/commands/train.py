@@ -9,7 +9,13 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from stereoforge.errors import UsageError
-from stereoforge.inputs.flag_values import parse_size, parse_weighted_source, several, shown
+from stereoforge.inputs.flag_values import (
+    check_disparity_scale,
+    parse_size,
+    parse_weighted_source,
+    several,
+    shown,
+)
 from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console
 from stereoforge_kit.files import write_bytes
@@ -71,8 +77,10 @@ class Train:
     """Share of the run over which the crops come from a growing first part of every data set, for those rendered from
     simple to complex (render --curriculum)."""
     pseudo_labels: Annotated[Path | None, shown("DIR", "none")] = None
-    """Folder of disparities to train on instead of the data set's ground truth: <frame name> with .pfm, .npy,
-    .npz or KITTI-like .png."""
+    """Folder of disparities to train on instead of the data set's ground truth: <frame name> with .pfm, .png, .npy,
+    .npz, .tiff or .exr."""
+    disparity_scale: Annotated[float | None, shown("S", "256 in 16-bit PNG, else 1")] = None
+    """Pseudo labels: value / S is the disparity in pixels."""
     init: Annotated[Path | None, shown("RUN", "none")] = None
     """Run folder of the regressor to start from or to build on; for joint, of all three networks and, where they are
     validated, of the refinement's parameters, which are copied too."""
@@ -119,6 +127,7 @@ class Train:
                 raise UsageError(f"--{name} must be at least {least}, got {value}")
         if self.network is not None and self.task != "regressor":
             raise UsageError(f"--network is for regressor; {self.task} takes the regressor of its run folder")
+        check_disparity_scale(self.disparity_scale, "--pseudo-labels", self.pseudo_labels)
         data = [parse_weighted_source(text) for text in self.data]
         for source, _ in data:
             keep_apart("--out", self.out, "--data", source)
@@ -150,6 +159,7 @@ class Train:
             validation=self.validation,
             changes=self._changes(),
             pseudo_labels=self.pseudo_labels,
+            disparity_scale=self.disparity_scale,
             init=self.init,
             refinement=through.ours_quadratic if through else None,
             resume=self.resume,

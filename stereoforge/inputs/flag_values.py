@@ -122,6 +122,16 @@ def parse_methods(text: str) -> tuple[str, ...]:
     return names
 
 
+def check_disparity_scale(scale: float | None, flag: str, disparity: Path | None) -> None:
+    """Raise UsageError for a --disparity-scale that is not positive, or without the flag that gives disparities."""
+    if scale is None:
+        return
+    if not 0 < scale < float("inf"):
+        raise UsageError(f"--disparity-scale must be positive, got {scale}")
+    if disparity is None:
+        raise UsageError(f"--disparity-scale goes with {flag}")
+
+
 def check_max_disparity(pixels: int | None) -> None:
     """Raise UsageError for a --max-disparity that is not positive."""
     if pixels is not None and pixels < 1:

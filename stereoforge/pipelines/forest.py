@@ -15,7 +15,7 @@ from refine.forest import Forest, save_forest
 from refine.forest.fitting import ForestConfig, ForestFrame, grow_forest
 from stereoforge.errors import CommandError
 from stereoforge.pipelines.prediction import forest_file
-from stereoforge.progress import progress_bar
+from stereoforge.progress import progress_bar, remark
 from stereoforge_kit.matching import left_right_consistency
 from training.prediction.predictor import StereoPredictor
 
@@ -49,7 +49,11 @@ def train_forest(
     file = forest_file(out)
     if file.exists():
         raise CommandError(f"{file}: is there already; choose another folder or remove it")
-    samples = [sample for text in data for sample in open_source(text).frames("train")]
+    sources = [open_source(text) for text in data]
+    samples = [sample for source in sources for sample in source.frames("train")]
+    for source in sources:
+        if note := source.note:
+            remark(f"{source.location}: {note}")
     chosen = np.unique(np.linspace(0, len(samples) - 1, min(plan.frames, len(samples))).round().astype(int))
     require_ground_truth(", ".join(data), [samples[i] for i in chosen])
     predictor = StereoPredictor(out, device)

@@ -185,7 +185,7 @@ def validation_frames(
         DatasetError: If a data set has splits, but none for validation, or if no frame has ground truth.
     """
     for source in sources:
-        if not source.format.splits and source.selection is None:
+        if not (source.splits or source.sets_aside) and source.selection is None:
             raise CommandError(
                 f"{source.location}: has no validation split, and parameters must not be chosen on what is tested; "
                 f"say which frames to choose on, such as {source.location}#0-19"

@@ -56,10 +56,14 @@ def open_test_data(sources: Sequence[str], split: str, *, skip_broken: bool = Fa
     names = [name if short.count(name) == 1 else source for name, source in zip(short, sources, strict=True)]
     opened = []
     for name, source in zip(names, sources, strict=True):
-        frames = open_source(source).frames(split)
+        data = open_source(source)
+        frames = data.frames(split)
         require_ground_truth(source, frames)
         family = family_of(source, frames)
         facts = {"Source": source, "Split": split} | ({"Family": family} if family else {})
+        if note := data.note:
+            facts["Files"] = note
+            remark(f"{name}: {note}")
         if missing := missing_files(frames):
             sentence = describe_missing(source, missing, len(frames))
             if not skip_broken:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.formats import write_png
-from datagen.formats.disparity import PNG_UNITS_PER_PX
+from datagen.formats.disparity import PNG_UNITS_PER_PX, to_units
 from datagen.sources.kitti import FORMATS, testing_frames
 from datagen.sources.registry import open_source
 from datagen.sources.stereo_frame import StereoFrame
@@ -77,5 +77,4 @@ def write_submission(submission: Submission, predictors: Predictors, method: Met
 
 def encode_disparity(disparity: NDArray[np.float32]) -> NDArray[np.uint16]:
     """(H, W) pixels to KITTI's units; the smallest is 1, since 0 says that there is none (NaN)."""
-    units = np.clip(np.rint(np.nan_to_num(disparity, nan=0.0) * PNG_UNITS_PER_PX), 1, LARGEST)
-    return np.where(np.isnan(disparity), 0, units).astype(np.uint16)
+    return to_units(np.minimum(disparity, LARGEST / PNG_UNITS_PER_PX), PNG_UNITS_PER_PX)

@@ -120,7 +120,7 @@ class _Study:
 
     def _has_splits(self, name: str) -> bool:
         source = self.plan.domains[name].source
-        return source is None or len(open_source(source).format.splits) > 0
+        return source is None or len(open_source(source).splits) > 0
 
     @cached_property
     def adapted_domains(self) -> tuple[str, ...]:
@@ -404,7 +404,7 @@ def _fingerprint(source: str, splits: tuple[str, ...]) -> str:
     Raises DatasetError for a set that is missing or has none of the splits.
     """
     opened = open_source(source)
-    present = [split for split in splits if not opened.format.splits or split in opened.format.splits]
+    present = [split for split in splits if not opened.splits or split in opened.splits]
     digest = hashlib.sha256(source.encode())
     for split in present or splits:
         try:

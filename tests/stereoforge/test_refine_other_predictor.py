@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -30,6 +31,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray]:
     given[40:50, 90:110] += 9
     write_pfm(folder / "given.pfm", given)
     write_png(folder / "given.png", np.where(np.isfinite(given), given.clip(0) * 256, 0).astype(np.uint16))
+    cv2.imwrite(str(folder / "given.tiff"), given * np.float32(100))
     write_pfm(folder / "given_right.pfm", pair.disparity_right)
     return folder, pair.disparity_left
 
@@ -59,6 +61,7 @@ def test_the_deviation_is_a_file_and_leaves_the_disparity_alone(world, tmp_path)
     [
         ("--disparity", "given.pfm"),
         ("--disparity", "given.png"),
+        ("--disparity", "given.tiff", "--disparity-scale", "100"),
         ("--disparity", "given.pfm", "--disparity-right", "given_right.pfm"),
         ("--predictor", "sgbm"),
     ],
@@ -85,10 +88,21 @@ def test_a_foreign_disparity_gets_better_without_any_network(world, tmp_path, so
     assert {path.name for path in (tmp_path / "r").iterdir()} >= {"gradient.exr", "overview.png"}
 
 
+def test_a_scale_is_positive_and_of_a_disparity(world, tmp_path, capsys):
+    folder, _ = world
+    for words, reason in (
+        (("--disparity", folder / "given.pfm", "--disparity-scale", "0"), "must be positive, got 0.0"),
+        (("--disparity-scale", "256"), "--disparity-scale goes with --disparity"),
+    ):
+        refine(folder, tmp_path / "r", *words, code=2)
+        assert reason in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "r").exists()
+
+
 def test_a_disparity_of_the_wrong_sign_or_unit_and_swapped_views_are_doubted(world, tmp_path, capsys):
     folder, truth = world
     for name, wrong, doubt in (
-        ("negative", np.where(np.arange(128) < 4, truth, -truth), "of the disparity is known"),
+        ("negative", np.where(np.arange(128) < 4, truth, -truth), "so the sign is turned"),
         ("normalised", truth / 128, "is it in pixels?"),
     ):
         write_pfm(tmp_path / f"{name}.pfm", wrong.astype(np.float32))

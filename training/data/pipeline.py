@@ -20,7 +20,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from datagen.formats.impossible_disparity import ImpossibleShare
 from datagen.sources.ground_truth import mean_share
-from datagen.sources.registry import open_source
+from datagen.sources.registry import DataSource, open_source
 from datagen.sources.stereo_frame import StereoFrame
 from datagen.sources.webdataset import ShardFrames
 from training.data.augmentation import IDENTITY_CURVE, StereoPair, TrainingSample, Window, augment, cut
@@ -49,6 +49,8 @@ class Source:
     """How often it is drawn from, relative to the other sources' weights."""
     fingerprint: str = ""
     """What identifies the frames (`training.data.fingerprint`)."""
+    remarks: tuple[str, ...] = ()
+    """What the user should know of how the frames were found and read."""
 
 
 def read_pair(frame: StereoFrame) -> StereoPair:
@@ -327,7 +329,7 @@ def open_sources(
             raise TrainingError(f"{location}: the weight of a data set must be positive, got {weight}")
         opened = open_source(location)
         frames = opened.frames("train")
-        sources.append(Source(frames, weight, data_fingerprint(opened.location, frames)))
+        sources.append(_source(opened, frames, weight))
         if not validation:
             held_out.extend(opened.validation_frames())
     check_sizes(
@@ -337,6 +339,19 @@ def open_sources(
     for location in validation:
         held_out.extend(open_source(location).held_out_frames())
     return sources, held_out
+
+
+def _source(opened: DataSource, frames: Sequence[StereoFrame], weight: float) -> Source:
+    """A source with what is to be said of how its frames were found."""
+    remarks = [] if opened.note is None else [f"{opened.location}: {opened.note}"]
+    if opened.sets_aside:
+        count = len(opened.validation_frames())
+        remarks.append(
+            f"{opened.location}: has no validation split, so its last {count} of {count + len(frames)} frames are not "
+            "trained on but validate"
+        )
+    fingerprint = data_fingerprint(opened.location, frames, opened.options.get("scale"))
+    return Source(frames, weight, fingerprint, tuple(remarks))
 
 
 def check_sizes(sizes: Sequence[tuple[str, tuple[int, int]]], crop: tuple[int, int]) -> None:

@@ -47,6 +47,8 @@ class TrainingRequest:
     """Other values for some of the preset's fields."""
     pseudo_labels: Path | None = None
     """Folder of disparities (`training.data.pseudo_labels`) to train on instead of the data set's ground truth."""
+    disparity_scale: float | None = None
+    """What a pixel of disparity is stored as in the pseudo labels; None for what their formats say."""
     init: Path | None = None
     """Run folder of the regressor to start from (`regressor`: a new one by default) or to build on (other tasks: `out`
     by default; from another folder it is copied to `out`). `joint` starts from all three networks of this folder,
@@ -106,11 +108,16 @@ class RunPlan:
             # What the data sets are, not where: one may be named by another path, or moved.
             "data": [[source.fingerprint, source.weight] for source in sources],
             "validation": [str(source) for source in request.validation],
-            "pseudo_labels": None if request.pseudo_labels is None else str(request.pseudo_labels),
+            "pseudo_labels": None if request.pseudo_labels is None else _pseudo_labels(request),
             "precision": request.precision,
             "processes": process_count(),
             "refinement": None if self.refinement is None else asdict(self.refinement),
         }
+
+
+def _pseudo_labels(request: TrainingRequest) -> str:
+    scale = "" if request.disparity_scale is None else f" / {request.disparity_scale:g}"
+    return f"{request.pseudo_labels}{scale}"
 
 
 def plan_run(request: TrainingRequest) -> RunPlan:
@@ -139,7 +146,7 @@ def _changed_preset(request: TrainingRequest) -> tuple[Preset, str]:
         preset = change_preset(preset, request.changes)
         name += " with " + ", ".join(f"{field} {value}" for field, value in request.changes.items())
     if request.pseudo_labels is not None:
-        name += f", pseudo labels from {request.pseudo_labels}"
+        name += f", pseudo labels from {_pseudo_labels(request)}"
     return preset, name
 
 

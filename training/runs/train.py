@@ -66,7 +66,7 @@ def train(request: TrainingRequest) -> TrainingSummary:
         built = build_task(plan, module)
         callbacks = _callbacks(plan, built, _summary_of(plan, sources), interruption)
         if request.progress:
-            remarks = _remarks(plan, module, continued)
+            remarks = [*_said_of(sources), *_remarks(plan, module, continued)]
             callbacks.append(RunProgress(f"{request.task} ({plan.preset_name})", remarks))
         checkpoint = None if continued is None else continued.checkpoint
         trainer = _trainer(plan, callbacks)
@@ -81,7 +81,7 @@ def _open_data(plan: RunPlan) -> tuple[list[Source], list[StereoFrame]]:
     request, crop = plan.request, (plan.preset.crop_height, plan.preset.crop_width)
     sources, held_out = open_sources(request.data, crop, request.validation)
     if request.pseudo_labels is not None:
-        sources = [with_pseudo_labels(sources, request.pseudo_labels)]
+        sources = [with_pseudo_labels(sources, request.pseudo_labels, request.disparity_scale)]
     for (location, _), source in zip(request.data, sources, strict=True):
         require_ground_truth(str(location), source.frames)
     require_ground_truth(", ".join(map(str, request.validation or (d for d, _ in request.data))), held_out)
@@ -119,6 +119,10 @@ def _remarks(plan: RunPlan, module: StereoDataModule, continued: Continuation | 
         note = describe_continuation(plan.preset, plan.steps, continued)
         remarks.append(f"{plan.request.task} ({plan.preset_name}): {note}")
     return remarks
+
+
+def _said_of(sources: Sequence[Source]) -> Iterator[str]:
+    return (remark for source in sources for remark in source.remarks)
 
 
 def _callbacks(

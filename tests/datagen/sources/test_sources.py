@@ -91,7 +91,11 @@ def holes(name: str, truth: np.ndarray) -> np.ndarray:
 
 def test_every_format_is_tested() -> None:
     formats = {name.removesuffix("-final") for name in source_formats()}
-    assert formats == set(SETS) | {"native"}
+    assert formats == set(SETS) | {
+        "native",
+        "folder",
+        "list",
+    }  # the last two in tests/datagen/sources/own_data
 
 
 def test_final_passes(tmp_path: Path) -> None:

@@ -27,6 +27,18 @@ def test_markers_of_no_disparity_become_nan(tmp_path: Path) -> None:
     np.testing.assert_array_equal(disparity, [[NAN, 1, 1.5], [NAN, 1 / 256, NAN]])
 
 
+def test_what_was_taken_for_granted_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    np.save(path, np.array([[24, -16, 320]], np.int16))
+    disparity, remarks = read_disparity(path, (1, 3))
+    np.testing.assert_array_equal(disparity, np.array([[1.5, NAN, NAN]], np.float32))
+    assert remarks[0] == f"{path}: int16 is taken for OpenCV's fixed point, 16 units a pixel"
+    assert "50.00% larger than the picture is wide" in remarks[1]
+    disparity, remarks = read_disparity(path, (1, 3), 160)
+    np.testing.assert_array_equal(disparity, np.array([[0.15, NAN, 2]], np.float32))
+    assert remarks == []
+
+
 @pytest.mark.parametrize("sentinel", [65535.0, 1e30, -999.0])
 def test_sentinels_are_no_disparity(tmp_path: Path, sentinel: float) -> None:
     expected = np.full((90, 160), 12.5, np.float32)
@@ -64,16 +76,16 @@ def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
     write_pfm(tmp_path / "color.pfm", np.arange(18, dtype=np.float32).reshape(2, 3, 3))
     write_png(tmp_path / "grey.png", np.zeros((2, 3), np.uint8))
     (tmp_path / "cut.pfm").write_bytes(b"Pf\n3 2\n-1.0\n1234")
-    (tmp_path / "map.tif").write_bytes(b"")
+    (tmp_path / "map.jpg").write_bytes(b"")
     for name, reason in (
         ("nothing.pfm", "holds no disparity"),
-        ("map.tif", r"\.pfm, a 16-bit \.png, a \.npy or a \.npz"),
+        ("map.jpg", r"\.pfm, a 16-bit \.png or a \.tiff file"),
         ("gone.pfm", "no such file"),
     ):
         with pytest.raises(CommandError, match=f"{name}: .*{reason}"):
             read_disparity(tmp_path / name, (2, 3))
     for name, reason in (
-        ("grey.png", "16-bit grey PNG"),
+        ("grey.png", "uint8 in unknown units; say with --disparity-scale"),
         ("cut.pfm", "header promises"),
         ("color.pfm", "three channels that differ"),
     ):

@@ -1,0 +1,1 @@
+"""One module for each format of disparity files, with a `FORMAT`."""
