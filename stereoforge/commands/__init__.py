@@ -17,6 +17,7 @@ COMMANDS = {
     "train": "Train",
     "export-model": "ExportModel",
     "tune": "Tune",
+    "check": "Check",
     "refine": "Refine",
     "evaluate": "Evaluate",
     "study": "Study",
