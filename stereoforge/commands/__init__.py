@@ -18,6 +18,7 @@ COMMANDS = {
     "export-model": "ExportModel",
     "tune": "Tune",
     "check": "Check",
+    "rectify": "Rectify",
     "refine": "Refine",
     "evaluate": "Evaluate",
     "study": "Study",
