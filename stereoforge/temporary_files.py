@@ -14,7 +14,7 @@ from stereoforge_kit.messages import shortened
 
 OUT_FLAG = "--out"
 FOLDER = ".temporary"
-_FILES = (".html", ".json")
+_FILES = (".html", ".json", ".png")
 """What commands write that write no folder."""
 _CACHES = ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")
 

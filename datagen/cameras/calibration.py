@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
@@ -162,6 +163,16 @@ def matrix_of(values: Any, rows: int, columns: int, name: str) -> NDArray[np.flo
     except (TypeError, ValueError) as error:
         raise InputError(f"its {name} is no {rows}x{columns} matrix") from error
     return matrix
+
+
+def mapping_of_yaml(text: str) -> dict[str, Any] | None:
+    """What YAML holds by name; None for what is no YAML, no mapping, or has aliases, which could grow without end."""
+    try:
+        aliases = any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text, yaml.SafeLoader))
+        data = None if aliases else yaml.safe_load(text)
+    except (yaml.YAMLError, RecursionError, ValueError):
+        return None
+    return data if isinstance(data, dict) else None
 
 
 @dataclass(frozen=True)

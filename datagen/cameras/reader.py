@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from datagen.cameras.calibration import Calibration, CalibrationText
+from datagen.cameras.raw_calibration import RawCalibration
 
 
 @dataclass(frozen=True)
@@ -18,3 +19,6 @@ class CalibrationReader:
     """Whether these files have the format. Never True for files of another one."""
     read: Callable[[tuple[CalibrationText, ...]], Calibration]
     """Raises ValueError, without the file's name, for what is missing or wrong."""
+    read_raw: Callable[[tuple[CalibrationText, ...], tuple[int, int] | None], RawCalibration] | None = None
+    """The same of the pair before rectification, given the pictures' (width, height) where they are known; None for a
+    format that knows rectified pairs only."""

@@ -17,6 +17,8 @@ COMMANDS = {
     "train": "Train",
     "export-model": "ExportModel",
     "tune": "Tune",
+    "check": "Check",
+    "rectify": "Rectify",
     "refine": "Refine",
     "evaluate": "Evaluate",
     "study": "Study",

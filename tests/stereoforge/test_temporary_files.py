@@ -26,6 +26,7 @@ def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     [
         (["render", "--out", "new/set v1.5"], "new/set v1.5"),
         (["view", "set", "--out=new/page.html"], "new"),
+        (["check", "left.png", "right.png", "--out=new/matches.png"], "new"),
     ],
 )
 def test_they_lie_in_out_and_go_away(

@@ -39,4 +39,15 @@ def _read(texts: tuple[CalibrationText, ...]) -> Calibration:
     return calibration_of(left, right, data["baseline_m"], size_of(data["width"], data["height"]))
 
 
+def as_json(calibration: Calibration) -> str:
+    """The text that this module reads. Raises ValueError for a calibration without a size."""
+    if calibration.size is None:
+        raise InputError("a calibration without a size cannot be written")
+    width, height = calibration.size
+    numbers = {"width": width, "height": height} | {
+        key: getattr(calibration, key) for key in _KEYS if key not in ("width", "height")
+    }
+    return json.dumps(numbers, indent=2) + "\n"
+
+
 READER = CalibrationReader("a rig as JSON", _recognises, _read)
