@@ -215,7 +215,7 @@ class FileFrame:
         array = self._read(read)
         if array.shape[:2] != self.size:
             path = _first_path(read)
-            where = ", ".join(filter(None, (path and str(path), self.origin)))
+            where = ", ".join(str(place) for place in (path, self.origin) if place)
             raise DatasetError(
                 f"{self.name}: its {what} is {array.shape[1]}x{array.shape[0]}, "
                 f"its left image {self.size[1]}x{self.size[0]}{where and f' ({where})'}"

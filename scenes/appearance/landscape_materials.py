@@ -13,9 +13,8 @@ import numpy as np
 
 from scenes.appearance import material_textures as textures
 from scenes.appearance.material_textures import TextureSampler
-from scenes.appearance.materials import FINISHES, Finish
+from scenes.appearance.materials import FINISHES, Finish, Shares
 from scenes.appearance.palettes import BARK, CLOTH, PLASTER, VIVID, PaletteRange, sample_palette_in
-from scenes.appearance.room_materials import Shares
 from scenes.random_draws import chance, choose, new_seed, uniform
 from scenes.spec import Texture
 from scenes.textures.noise import FractalNoise

@@ -15,8 +15,8 @@ import numpy as np
 from scenes.appearance.landscape_materials import CHARACTER_SURFACES
 from scenes.appearance.lights import sample_area_light, sample_light_color, sample_sun
 from scenes.appearance.material_textures import TextureSampler, ground, leaves, rock
+from scenes.appearance.materials import Shares
 from scenes.appearance.palettes import DRY_GRASS, EARTH, FOLIAGE, MOSS, ROCK, VIVID
-from scenes.appearance.room_materials import Shares
 from scenes.family import Family
 from scenes.landscapes.characters import Character, place_character
 from scenes.landscapes.creatures import Coat, sample_creature

@@ -15,7 +15,7 @@ import numpy as np
 
 from scenes.appearance.landscape_materials import CHARACTER_SURFACES, plain
 from scenes.appearance.lights import sample_area_light, sample_sun
-from scenes.appearance.room_materials import Shares
+from scenes.appearance.materials import Shares
 from scenes.family import Family
 from scenes.landscapes.characters import Character, place_character
 from scenes.landscapes.creatures import Coat, sample_creature

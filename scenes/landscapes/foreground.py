@@ -14,8 +14,8 @@ import numpy as np
 from scenes.appearance import landscape_materials as looks
 from scenes.appearance.landscape_materials import Surface, plain, plain_or
 from scenes.appearance.material_textures import TextureSampler, bark, leaves, rock, timber
+from scenes.appearance.materials import Shares
 from scenes.appearance.palettes import CLOTH, FOLIAGE, PLASTER, ROCK, VIVID
-from scenes.appearance.room_materials import Shares
 from scenes.placement.ground import GroundPlacement, Spot
 from scenes.random_draws import Range, chance, choose, integer, log_uniform, new_seed, uniform
 from scenes.shapes.nature.camp import Banner, Paling

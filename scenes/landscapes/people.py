@@ -222,8 +222,8 @@ def _hair(rng: np.random.Generator, body: Skeleton, head: int, outfit: Outfit) -
     if style == "bun":
         body.flesh("hair", head, (-0.07, 0.0, 0.965), (-0.085, 0.0, 0.96), 0.026, 0.024)
     if chance(rng, 0.3):
-        tip = uniform(rng, 0.76, 0.84)
-        body.flesh("hair", head, (0.05, 0.0, 0.868), (0.06, 0.0, tip), 0.024, 0.01)
+        beard_end = uniform(rng, 0.76, 0.84)
+        body.flesh("hair", head, (0.05, 0.0, 0.868), (0.06, 0.0, beard_end), 0.024, 0.01)
         for side in (-1.0, 1.0):
             body.flesh("hair", head, (0.066, side * 0.008, 0.893), (0.058, side * 0.024, 0.882), 0.006, 0.005)
 

@@ -22,6 +22,7 @@ from scenes.appearance.material_textures import (
     rock,
     roofing,
 )
+from scenes.appearance.materials import Shares
 from scenes.appearance.palettes import (
     DRY_GRASS,
     EARTH,
@@ -34,7 +35,6 @@ from scenes.appearance.palettes import (
     SNOW,
     PaletteRange,
 )
-from scenes.appearance.room_materials import Shares
 from scenes.landscapes.foreground import (
     PropSampler,
     banner,

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from scenes.appearance.landscape_materials import gloss_or_matte
 from scenes.appearance.material_textures import TextureSampler
-from scenes.appearance.room_materials import Shares
+from scenes.appearance.materials import Shares
 from scenes.landscapes.people import sample_person, statue
 from scenes.placement.ground import GroundPlacement, Spot
 from scenes.random_draws import chance, choose, integer, new_seed, uniform

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from scenes.appearance.room_materials import Shares
+from scenes.appearance.materials import Shares
 from scenes.family import FamilyConfig
 from scenes.motion.trajectories import KEY_SPACING_FRAMES, vector, wander
 from scenes.random_draws import Count, Range, chance, log_uniform, uniform

@@ -16,8 +16,8 @@ import numpy as np
 
 from scenes.appearance.landscape_materials import cap, gloss_or_matte
 from scenes.appearance.material_textures import TextureSampler, bark, horn, leaves
+from scenes.appearance.materials import Shares
 from scenes.appearance.palettes import FOLIAGE, PaletteRange
-from scenes.appearance.room_materials import Shares
 from scenes.placement.ground import GroundPlacement, Spot, sway_of
 from scenes.random_draws import Range, choose, log_uniform, uniform
 from scenes.shapes.anchored import PartedShape

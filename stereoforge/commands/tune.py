@@ -85,9 +85,9 @@ class Tune:
             for note in notes[:-1]:
                 remark(note)
             raise CommandError(notes[-1] if notes else f"{listed(methods)}: there is nothing to tune")
-        for source in sources:
-            if note := source.note:
-                remark(f"{source.location}: {note}")
+        for opened in sources:
+            if opened.note:
+                remark(f"{opened.location}: {opened.note}")
         frames = validation_frames(sources, predictors, self.frames)
         out = parameters_file(run, self.predictor) if self.out is None else self.out
         about = describe(frames, self.data, self.objective, network_digests(run, self.predictor))

@@ -55,6 +55,7 @@ class _Folder:
             PairFiles(
                 name="/".join(filter(None, (found, key))) or self.root.name,
                 scene_name=PurePosixPath(scene).parent.as_posix() if "/" in scene else scene,
+                origin="",
                 **{role: self.root / path for role, path in files.items()},
             )
             for ((found, key), files), scene in zip(chosen.items(), scenes, strict=True)

@@ -28,7 +28,7 @@ _SPLITS = {
     "val": "val", "valid": "val", "validation": "val", "dev": "val",
     "test": "test", "testing": "test", "testset": "test",
 }  # fmt: skip
-_VIEWS = {"left": "left", "l": "left", "right": "right", "r": "right"}
+_VIEWS: dict[str, Literal["left", "right"]] = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _ONE_WORD = re.compile(
     r"(left|right)(images?|imgs?|views?|disp|disparity)$|(images?|imgs?|im|disp|disparity|view)(l|r|left|right)$"
 )
@@ -138,10 +138,11 @@ def _view_numbers(read: Mapping[PurePosixPath, list[_Words]]) -> _Numbers:
         raise DatasetError(
             f"the views could be {one}{a} and {one}{b} or {two}{c} and {two}{d}; a list names the files (list:FILE)"
         )
+    views: tuple[Literal["left", "right"], ...] = ("left", "right")
     return {
         f"{base}{number}": (view, number)
         for base, pair in pairs
-        for view, number in zip(("left", "right"), pair, strict=True)
+        for view, number in zip(views, pair, strict=True)
     }
 
 
@@ -170,7 +171,7 @@ def _part_of(path: PurePosixPath, parts: list[_Words], numbers: _Numbers) -> Par
         return None
     if kind == "disparity" and numbered == "right" and not spoken and (_OCCLUDED | _VISIBLE) & set(seen):
         return None  # KITTI's disp_occ_1 is the left view's, a frame later.
-    role = view if kind == "picture" else _role_of(kind, view or "left")
+    role: Role | None = view if kind == "picture" else _role_of(kind, view or "left")
     if role is None:
         return None
     return Part(role, _key(rest), split, preferred=not (_VISIBLE & set(seen)))
@@ -192,9 +193,10 @@ def _without_number(
     digits = [word for word in words if word.isdigit()]
     if len(digits) != 1 or len(digits[0]) > 2:
         return words, None
-    known = {number.lstrip("0") or "0": view for view, number in numbers.values()}
+    known: dict[str, Literal["left", "right"]] = {}
     if not is_file:  # In a file's name other numbers count the frames.
-        known = {"0": "left", "1": "right"} | known
+        known = {"0": "left", "1": "right"}
+    known |= {number.lstrip("0") or "0": view for view, number in numbers.values()}
     view = known.get(digits[0].lstrip("0") or "0")
     return (words, None) if view is None else (tuple(word for word in words if word != digits[0]), view)
 

@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from scenes.appearance.room_materials import RoomMaterials, Shares
+from scenes.appearance.materials import Shares
+from scenes.appearance.room_materials import RoomMaterials
 from scenes.rooms.clutter import add_things
 from scenes.rooms.config import ROOM_KINDS, IndoorConfig
 from scenes.rooms.furnishing import furnish
