@@ -104,7 +104,8 @@ def plants(
 ) -> None:
     """Plants of a few kinds; near ones sway by a share `sway` of their height.
 
-    `sunk` is how deep they stand in the ground, relative to their scale; `spread` is the outermost image column.
+    `sunk` is how deep they stand in the ground, relative to their scale; 0 is on the lowest ground under them.
+    `spread` is the outermost image column.
     """
     placement, unit_m = area.placement, area.unit_m
     middle_m = math.sqrt(scales[0] * scales[1]) * unit_m
@@ -115,7 +116,14 @@ def plants(
         moves = spot.depth_m < NO_SWAY_BEYOND * unit_m
         motion = sway_of(rng, shape, uniform(rng, *sway)) if moves else None
         placement.stand(
-            f"{name} {index}", shape, material, spot, scale_m, sunk_m=sunk * scale_m, deformation=motion
+            f"{name} {index}",
+            shape,
+            material,
+            spot,
+            scale_m,
+            sunk_m=sunk * scale_m,
+            deformation=motion,
+            on_lowest=sunk == 0.0,
         )
 
 
