@@ -55,11 +55,11 @@ class Refine:
     interrupted: ClassVar[str] = "the same command run again continues where it stopped"
 
     left: Annotated[tyro.conf.Positional[Path], shown("LEFT")]
-    """Left picture (PNG, JPEG, TIFF, ...), a folder of them, or a video."""
-    right: Annotated[tyro.conf.Positional[Path], shown("RIGHT")]
-    """Right picture, rectified and of the same size, the folder of the right pictures, or the right video."""
+    """Left picture (PNG, JPEG, TIFF, ...), a folder of them, a video, or a list of pairs (.txt, .csv), a line each."""
     out: Annotated[Path, shown("DIR")]
     """Folder for the results."""
+    right: Annotated[tyro.conf.Positional[Path | None], shown("RIGHT", "none, with a list")] = None
+    """Right picture, rectified and of the same size, the folder of the right pictures, or the right video."""
     weights: Annotated[Path, shown("RUN", "the bundled weights")] = BUNDLED_WEIGHTS
     """Run folder with a regressor, a confnet and a gradnet, or with confnet_free and gradnet_free, which judge any
     predictor's disparity. paper: the bundled networks of the paper."""
@@ -104,7 +104,7 @@ class Refine:
         self._check()
         rig = known_rig(self.calibration, self.focal_px, self.baseline_m, self.doffs)
         pairs = open_pairs(self.left, self.right)
-        single = self.left.is_file() and not isinstance(pairs, VideoPairs)
+        single = self.right is not None and not self.left.is_dir() and not isinstance(pairs, VideoPairs)
         if not single and self.disparity is not None:
             raise UsageError("--disparity is of one pair; give two pictures")
         if single and self.video:
@@ -159,7 +159,7 @@ class Refine:
         return {
             **refiner.settings,
             "left": str(self.left.resolve()),
-            "right": str(self.right.resolve()),
+            "right": None if self.right is None else str(self.right.resolve()),
             "deviation": self.deviation,
             "rig": None if rig is None else rig.as_json(),
             "min_confidence": self.min_confidence,
@@ -210,7 +210,7 @@ class Refine:
         if self.disparity_right is not None and self.disparity is None:
             raise UsageError("--disparity-right goes with --disparity")
         for flag, read in (("LEFT", self.left), ("RIGHT", self.right)):
-            if read.is_dir():
+            if read is not None and read.is_dir():
                 keep_apart("--out", self.out, flag, read)
         if not 0 <= self.min_confidence <= 1:
             raise UsageError(f"--min-confidence must lie between 0 and 1, got {self.min_confidence}")

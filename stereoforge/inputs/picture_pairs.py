@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.errors import FormatError
+from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
+from datagen.sources.own_data.listing import VIEWS, parse_list
 from stereoforge.errors import UsageError
 from stereoforge.inputs.images import read_color_images
 
@@ -76,6 +79,33 @@ def find_pairs(left: Path, right: Path) -> PicturePairs:
     return PicturePairs(
         pairs, f"paired in the order of their names, such as {first.left.name} and {first.right.name}"
     )
+
+
+def listed_pairs(file: Path) -> PicturePairs:
+    """The pairs that a list names, one a line, with paths relative to its folder; further columns are left out.
+
+    Raises:
+        DatasetError: a list without pairs, or a line that is none, with its number.
+        UsageError: two lines with the same left picture, or a picture that is not there.
+    """
+    try:
+        text = read_bounded(file, MAX_JSON_BYTES).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{file}: is no list, which is text in UTF-8") from error
+    pairs: dict[str, PicturePair] = {}
+    for line in parse_list(text, str(file), VIEWS).lines:
+        left, right = (file.parent / line.files[view].replace("\\", "/") for view in VIEWS)
+        for path in (left, right):
+            if not path.is_file():
+                raise UsageError(f"{file}: line {line.number}: there is no file {path}")
+        inside = left.is_relative_to(file.parent) and ".." not in left.parts
+        name = "_".join(left.relative_to(file.parent).with_suffix("").parts) if inside else left.stem
+        if name in pairs:
+            raise UsageError(
+                f"{file}: line {line.number}: its results would be called {name}, as those of another line are"
+            )
+        pairs[name] = PicturePair(name, left, right)
+    return PicturePairs(tuple(pairs.values()))
 
 
 def _pictures(folder: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-"""What the user names to be matched: two pictures, two folders of them, or two videos."""
+"""What the user names to be matched: two pictures, two folders of them, two videos, or a list."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereoforge.errors import UsageError
-from stereoforge.inputs.picture_pairs import find_pairs
+from stereoforge.inputs.picture_pairs import find_pairs, listed_pairs
 from stereoforge.inputs.videos import VIDEOS, VideoPairs
+
+LISTS = (".txt", ".csv", ".tsv", ".lst")
+"""Endings of lists."""
 
 
 class StereoPair(Protocol):
@@ -39,13 +42,18 @@ class StereoPairs(Protocol):
         """Give them one after the other."""
 
 
-def open_pairs(left: Path, right: Path) -> StereoPairs:
-    """The pairs of two pictures, two folders of pictures or two videos.
+def open_pairs(left: Path, right: Path | None) -> StereoPairs:
+    """The pairs of two pictures, two folders of pictures or two videos, or, with one path alone, those of a list.
 
     Raises:
-        UsageError: things of two kinds, or a folder without pictures or without partners.
+        UsageError: things of two kinds, a folder without pictures or without partners, or one path that is no list.
+        DatasetError: a list that cannot be understood.
         CommandError: videos that cannot be read.
     """
+    if right is None:
+        if left.suffix.lower() not in LISTS or not left.is_file():
+            raise UsageError(f"{left}: is no list of pairs ({', '.join(LISTS)}), and no RIGHT goes with it")
+        return listed_pairs(left)
     videos = [path for path in (left, right) if path.suffix.lower() in VIDEOS and not path.is_dir()]
     if len(videos) == 1:
         other = right if videos[0] == left else left

@@ -123,3 +123,38 @@ def test_pictures_of_other_names_are_paired_in_their_order(
     assert "holds something else already" in told(capsys, 1, left, right, "--out", tmp_path / "again")
     assert "differ in size" in told(capsys, 1, left, right, "--out", tmp_path / "other")
     assert (tmp_path / "other" / "000" / "overview.png").is_file()  # what was done stays
+
+
+def test_a_list_of_pairs(
+    folders: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Results are named after the left pictures; columns after the second are left out."""
+    pairs = tmp_path / "pairs.txt"
+    lines = [f"left/{name}.png right/{name}.png disparity/{name}.pfm" for name in ("000", "002")]
+    pairs.write_text("\n".join(["# ours", *lines]) + "\n")
+    out = tmp_path / "out"
+    assert "2 pairs refined, 0 were there already" in told(capsys, 0, pairs, "--out", out)
+    assert sorted(path.name for path in out.iterdir()) == ["left_000", "left_002", "settings.json"]
+    told(capsys, 0, folders[0] / "002.png", folders[1] / "002.png", "--out", tmp_path / "one")
+    one = read_pfm(tmp_path / "one" / "disparity.pfm")
+    np.testing.assert_array_equal(read_pfm(out / "left_002" / "disparity.pfm"), one)
+
+
+def test_lists_that_cannot_be(
+    folders: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pairs, out = tmp_path / "pairs.csv", tmp_path / "out"
+    for text, sentence in (
+        ("left/000.png,right/009.png\n", "line 1: there is no file"),
+        ("left/000.png,right/000.png\nleft/001.png\n", "line 2 has 1 column where there should be 2"),
+        ("left/000.png,right/000.png\n" * 2, "line 2: its results would be called left_000"),
+        ("", "names no pair; each line needs left and right"),
+    ):
+        pairs.write_text(text)
+        with pytest.raises(SystemExit) as end:
+            main(["refine", str(pairs), "--out", str(out)])
+        assert sentence in " ".join(capsys.readouterr().err.split())
+        assert end.value.code in (1, 2)
+    alone = told(capsys, 2, folders[0] / "000.png", "--out", out)
+    assert "is no list of pairs (.txt, .csv, .tsv, .lst), and no RIGHT goes with it" in alone
+    assert not out.exists()

@@ -1,9 +1,9 @@
 """The lines of a list of pairs, as trainers of stereo networks have them.
 
-Every line names the files of one pair: left, right, disparity, and perhaps one more, in columns that spaces, commas,
-semicolons or tabs separate. Names with separators in them stand in double quotes. Empty lines and lines that begin with
-# are skipped. A first line of names (left, right, disp, ...) says what the columns are, in any order, and columns of
-other names are left out.
+Every line names the files of one pair: left, right, disparity where there is one, and perhaps one more, in columns
+that spaces, commas, semicolons or tabs separate. Names with separators in them stand in double quotes. Empty lines and
+lines that begin with # are skipped. A first line of names (left, right, disp, ...) says what the columns are, in any
+order, and columns of other names are left out.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ from datagen.sources.own_data.names import Role, column_role, parts_of
 from stereoforge_kit.messages import shortened
 
 _SEPARATORS = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "spaces"}
-_NEEDED: tuple[Role, ...] = ("left", "right", "disparity")
+WITH_DISPARITY: tuple[Role, ...] = ("left", "right", "disparity")
+"""What a line of a set with ground truth has."""
+VIEWS: tuple[Role, ...] = ("left", "right")
+"""What a line of pairs to be matched has."""
 _LONGEST = 60
 
 
@@ -41,8 +44,8 @@ class PairList:
     """In words."""
 
 
-def parse_list(text: str, origin: str) -> PairList:
-    """Parse a list; `origin` names it in errors.
+def parse_list(text: str, origin: str, needed: tuple[Role, ...] = WITH_DISPARITY) -> PairList:
+    """Parse a list; `origin` names it in errors, and `needed` says what every line must have.
 
     Raises:
         DatasetError: an empty list, or a line that is none, with its number.
@@ -56,18 +59,18 @@ def parse_list(text: str, origin: str) -> PairList:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not lines:
-        raise DatasetError(f"{origin}: names no pair; each line needs left, right and disparity")
+        raise DatasetError(f"{origin}: names no pair; each line needs {_listed(needed)}")
     separator = next((each for each in _SEPARATORS if each in lines[0][1]), " ")
     rows = [(number, _cells(line, separator, f"{origin}: line {number}")) for number, line in lines]
     columns = _header(rows[0][1])
     if columns is None:
-        columns = _usual_columns(rows[0][1], f"{origin}: line {rows[0][0]}")
+        columns = _usual_columns(rows[0][1], f"{origin}: line {rows[0][0]}", needed)
     else:
-        _check_header(columns, f"{origin}: line {rows[0][0]}")
+        _check_header(columns, f"{origin}: line {rows[0][0]}", needed)
         rows = rows[1:]
         if not rows:
             raise DatasetError(f"{origin}: names no pair below its header")
-    parsed = tuple(_line(number, cells, columns, origin) for number, cells in rows)
+    parsed = tuple(_line(number, cells, columns, origin, needed) for number, cells in rows)
     return PairList(parsed, columns, _SEPARATORS[separator])
 
 
@@ -86,24 +89,28 @@ def _header(cells: list[str]) -> tuple[Role | None, ...] | None:
     return None if names_files or not {"left", "right"} <= set(roles) else roles
 
 
-def _check_header(columns: tuple[Role | None, ...], where: str) -> None:
+def _check_header(columns: tuple[Role | None, ...], where: str, needed: tuple[Role, ...]) -> None:
     known = [role for role in columns if role is not None]
     twice = next((role for role in known if known.count(role) > 1), None)
     if twice is not None:
         raise DatasetError(f"{where} names two columns that could be {twice}")
-    if "disparity" not in known:
+    if "disparity" in needed and "disparity" not in known:
         raise DatasetError(f"{where} names no column of disparities (disp, disparity, gt)")
 
 
-def _usual_columns(cells: list[str], where: str) -> tuple[Role | None, ...]:
-    if len(cells) == len(_NEEDED):
-        return _NEEDED
-    if len(cells) == len(_NEEDED) + 1:
-        return (*_NEEDED, _fourth(cells[-1]))
+def _usual_columns(cells: list[str], where: str, needed: tuple[Role, ...]) -> tuple[Role | None, ...]:
+    if len(needed) <= len(cells) <= len(WITH_DISPARITY):
+        return WITH_DISPARITY[: len(cells)]
+    if len(cells) == len(WITH_DISPARITY) + 1:
+        return (*WITH_DISPARITY, _fourth(cells[-1]))
     raise DatasetError(
-        f"{where} has {_columns(len(cells))} ({shortened(' '.join(cells), _LONGEST)}); left, right and disparity are "
+        f"{where} has {_columns(len(cells))} ({shortened(' '.join(cells), _LONGEST)}); {_listed(needed)} are "
         "needed, then perhaps a mask, or a header that names the columns"
     )
+
+
+def _listed(needed: tuple[Role, ...]) -> str:
+    return f"{', '.join(needed[:-1])} and {needed[-1]}"
 
 
 def _fourth(cell: str) -> Role:
@@ -115,14 +122,20 @@ def _fourth(cell: str) -> Role:
     return part.role if part is not None and part.role in ("occlusion", "visible") else "valid"
 
 
-def _line(number: int, cells: list[str], columns: tuple[Role | None, ...], origin: str) -> ListLine:
+def _line(
+    number: int,
+    cells: list[str],
+    columns: tuple[Role | None, ...],
+    origin: str,
+    needed: tuple[Role, ...],
+) -> ListLine:
     if len(cells) != len(columns):
         raise DatasetError(
             f"{origin}: line {number} has {_columns(len(cells))} where there should be {len(columns)} "
             f"({shortened(' '.join(cells), _LONGEST)})"
         )
     files = {role: cell for role, cell in zip(columns, cells, strict=True) if role is not None and cell}
-    lacking = next((role for role in _NEEDED if role not in files), None)
+    lacking = next((role for role in needed if role not in files), None)
     if lacking is not None:
         raise DatasetError(f"{origin}: line {number} has no {lacking}")
     return ListLine(number, files)
