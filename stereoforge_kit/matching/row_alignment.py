@@ -53,7 +53,10 @@ class RowAlignment:
     @property
     def worst_px(self) -> float:
         """The largest offset of a part of the picture that is surely there, without its sign."""
-        return max((abs(offset) - 2 * error for *_, offset, error in self.parts), default=abs(self.median_px))
+        return max(
+            (max(abs(offset) - 2 * error, 0.0) for *_, offset, error in self.parts),
+            default=abs(self.median_px),
+        )
 
 
 def align_rows(matches: Matches, size: tuple[int, int]) -> RowAlignment | None:
