@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 BUNDLED_WEIGHTS = Path(__file__).resolve().parent / "weights"
-"""A run folder like any other, with a CostVolumeNet and the regressor-free heads; its model_card.md says how they were
-trained."""
+"""A run folder like any other, with a CostVolumeNet, its heads and the regressor-free ones; its model_card.md says how
+they were trained."""
 PAPER_WEIGHTS = BUNDLED_WEIGHTS / "paper"
 """A run folder with the paper's networks, trained by `make study` on its flying_things worlds."""
 
