@@ -77,8 +77,8 @@ class MonkaaConfig(LandscapeConfig):
 
     crowd = ("creatures", "fur_locks", "undergrowth", "grass_tufts", "trees", "boulders")
 
-    focus_disparity_share: Range = (0.018, 0.064)
-    """Disparity at the unit of depth, log-uniform, as a share of the image width (0.018 is 17 px at 960); it sets the
+    focus_disparity_share: Range = (0.022, 0.076)
+    """Disparity at the unit of depth, log-uniform, as a share of the image width (0.022 is 21 px at 960); it sets the
     baseline. In most scenes the main creature stands at the unit of depth."""
     creatures: Count = (1, 4)
     """Creatures per scene that has any; the first is the main one, at which the camera looks. Groups have up to two
