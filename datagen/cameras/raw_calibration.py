@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from datagen.cameras.calibration import LONGEST_BASELINE_M, matrix_of
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.messages import listed
 
 LensModel = Literal["brown", "fisheye"]
 COEFFICIENTS: dict[LensModel, tuple[int, ...]] = {"brown": (4, 5, 8, 12, 14), "fisheye": (4,)}
@@ -37,7 +38,8 @@ def lens_model_of(name: Any) -> LensModel:
     """The lens model that a file names. Raises ValueError for one that is not read."""
     key = str(name).strip().lower().replace("-", "_")
     if key not in LENS_MODELS:
-        raise InputError(f"its lens model {name!s:.30} is none of {', '.join(filter(None, LENS_MODELS))}")
+        known = [model for model in LENS_MODELS if model]
+        raise InputError(f"its lens model {name!s:.30} is none of {listed(known, most=len(known))}")
     return LENS_MODELS[key]
 
 
@@ -63,7 +65,7 @@ class RawView:
         counts = COEFFICIENTS[self.model]
         if self.distortion.size not in counts:
             raise InputError(
-                f"a lens of the {self.model} model has {' or '.join(map(str, counts))} coefficients, not "
+                f"a lens of the {self.model} model has {listed(sorted(counts), separator=' or ')} coefficients, not "
                 f"{self.distortion.size}"
             )
 

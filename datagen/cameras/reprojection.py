@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from datagen.cameras.calibration import Calibration
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.messages import listed
 
 
 def depth_of_disparity(disparity: NDArray[np.floating[Any]], calibration: Calibration) -> NDArray[np.float64]:
@@ -31,7 +32,7 @@ def depth_of_disparity(disparity: NDArray[np.floating[Any]], calibration: Calibr
     if calibration.size not in (None, (width, height)):
         raise InputError(
             f"the disparity is {width}x{height} and the calibration is of images of "
-            f"{'x'.join(map(str, calibration.size or ()))}"
+            f"{listed(calibration.size or (), separator='x')}"
         )
     parallax = disparity.astype(np.float64) + calibration.doffs
     with np.errstate(divide="ignore"):

@@ -15,6 +15,7 @@ from typing import overload
 from datagen.formats.disparity import disparity_formats, read_disparity, read_disparity_map
 from datagen.formats.impossible_disparity import PREDICTION_NOISE_PX
 from datagen.sources.stereo_frame import FileFrame, StereoFrame
+from stereoforge_kit.messages import listed
 from training.data.pipeline import Source
 from training.errors import TrainingError
 
@@ -90,4 +91,6 @@ def _file_of(folder: Path, name: str) -> Path:
         path = folder / f"{name}{suffix}"
         if path.is_file():
             return path
-    raise TrainingError(f"{folder}: has no disparity for the frame {name} ({name} with {', '.join(endings)})")
+    raise TrainingError(
+        f"{folder}: has no disparity for the frame {name} ({name} with {listed(list(endings), most=len(endings))})"
+    )

@@ -15,7 +15,7 @@ from datagen.recipe.preparation.mesh_parts import to_linear
 from datagen.recipe.preparation.mesh_surfaces import MAX_SIDE_PX
 from datagen.recipe.preparation.meshes import REMARK
 from stereoforge_kit.errors import InputError
-from stereoforge_kit.messages import shortened
+from stereoforge_kit.messages import listed, shortened
 
 TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 ENVIRONMENT_SUFFIXES = (".hdr", ".exr", *TEXTURE_SUFFIXES)
@@ -89,7 +89,7 @@ def _read_exr(path: Path, remarks: list[str]) -> NDArray[np.float32]:
             layer for layer, channels in layers.items() if {*"RGB"} <= channels.keys() or "Y" in channels
         ]
         if not pictures:
-            raise InputError(f"it has no layer with R, G and B among {shortened(', '.join(layers), 100)}")
+            raise InputError(f"it has no layer with R, G and B among {listed(list(layers))}")
         chosen = min(pictures, key=lambda layer: (layer != "", layer.lower().split(".")[-1] not in BEAUTY))
         if len(pictures) > 1:
             remarks.append(

@@ -19,7 +19,7 @@ from datagen.sources.own_data.pairs import SCALE, PairFiles, reading_remarks, un
 from datagen.sources.registry import SourceFormat
 from datagen.sources.stereo_frame import FileFrames, StereoFrame
 from stereoforge_kit.files import walk_files
-from stereoforge_kit.messages import shortened
+from stereoforge_kit.messages import listed, shortened
 
 _EXPECTED = "left and right, image_2 and image_3, im0 and im1, or _L and _R"
 _OPTIONAL: Mapping[Role, str] = {
@@ -109,7 +109,7 @@ def _check_whole(root: Path, pairs: Mapping[tuple[str, str], _Files]) -> None:
         )
     if "" in (splits := {split for split, _ in lefts}) and len(splits) > 1:
         raise DatasetError(
-            f"{root}: some pairs are in folders of splits ({', '.join(sorted(splits - {''}))}), others are not"
+            f"{root}: some pairs are in folders of splits ({listed(sorted(splits - {''}))}), others are not"
         )
     for split in sorted({split for split, _ in pairs}):
         _check_ground_truth(root, {name: files for name, files in pairs.items() if name[0] == split})

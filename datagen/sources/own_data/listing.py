@@ -14,14 +14,13 @@ from pathlib import PurePosixPath
 
 from datagen.errors import DatasetError
 from datagen.sources.own_data.names import Role, column_role, parts_of
-from stereoforge_kit.messages import shortened
+from stereoforge_kit.messages import listed
 
 _SEPARATORS = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "spaces"}
 WITH_DISPARITY: tuple[Role, ...] = ("left", "right", "disparity")
 """What a line of a set with ground truth has."""
 VIEWS: tuple[Role, ...] = ("left", "right")
 """What a line of pairs to be matched has."""
-_LONGEST = 60
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ def _usual_columns(cells: list[str], where: str, needed: tuple[Role, ...]) -> tu
     if len(cells) == len(WITH_DISPARITY) + 1:
         return (*WITH_DISPARITY, _fourth(cells[-1]))
     raise DatasetError(
-        f"{where} has {_columns(len(cells))} ({shortened(' '.join(cells), _LONGEST)}); {_listed(needed)} are "
+        f"{where} has {_columns(len(cells))} ({listed(cells, separator=' ')}); {_listed(needed)} are "
         "needed, then perhaps a mask, or a header that names the columns"
     )
 
@@ -132,7 +131,7 @@ def _line(
     if len(cells) != len(columns):
         raise DatasetError(
             f"{origin}: line {number} has {_columns(len(cells))} where there should be {len(columns)} "
-            f"({shortened(' '.join(cells), _LONGEST)})"
+            f"({listed(cells, separator=' ')})"
         )
     files = {role: cell for role, cell in zip(columns, cells, strict=True) if role is not None and cell}
     lacking = next((role for role in needed if role not in files), None)

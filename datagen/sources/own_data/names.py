@@ -134,10 +134,8 @@ def _view_numbers(read: Mapping[PurePosixPath, list[_Words]]) -> _Numbers:
         (base, pair) for base, numbers in names.items() for pair in _NUMBER_PAIRS if numbers.issuperset(pair)
     ]
     if len(pairs) > 1:
-        (one, (a, b)), (two, (c, d)) = pairs[:2]
-        raise DatasetError(
-            f"the views could be {one}{a} and {one}{b} or {two}{c} and {two}{d}; a list names the files (list:FILE)"
-        )
+        one, two = (f"{base}{left} and {base}{right}" for base, (left, right) in pairs[:2])
+        raise DatasetError(f"the views could be {one} or {two}; a list names the files (list:FILE)")
     views: tuple[Literal["left", "right"], ...] = ("left", "right")
     return {
         f"{base}{number}": (view, number)
