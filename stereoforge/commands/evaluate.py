@@ -146,13 +146,14 @@ class Evaluate:
         frames = ", ".join(f"{len(each.evaluation.frames)} of {each.name}" for each in sets)
         console.print(f"{files.html}: frames evaluated: {frames}")
         if by_field:
-            for row in (row for each in sets for row in generalization_rows(each)):
+            figures = [row for each in sets for row in generalization_rows(each)]
+            for row in figures:
                 console.print(
                     f"{row.set}, {row.method}: {row.epe:.2f} px; outliers over {row.outlier_px:g} px: occluded "
                     f"{row.occluded:.1f} %, visible {row.visible:.1f} %, all {row.all:.1f} %",
                     markup=False,
                 )
-            console.print(str(write_generalization(sets, self.out)), markup=False)
+            console.print(str(write_generalization(figures, self.out)), markup=False)
         if self.submission and submission:
             count = write_submission(submission, predictors, settings.ours, self.submission)
             console.print(f"{self.submission}: {count} disparities")

@@ -9,9 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.errors import FormatError
-from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
-from datagen.sources.own_data.listing import VIEWS, parse_list
+from datagen.sources.own_data.listing import VIEWS, read_list
 from stereoforge.errors import UsageError
 from stereoforge.inputs.images import read_color_images
 
@@ -88,12 +86,8 @@ def listed_pairs(file: Path) -> PicturePairs:
         DatasetError: a list without pairs, or a line that is none, with its number.
         UsageError: two lines with the same left picture, or a picture that is not there.
     """
-    try:
-        text = read_bounded(file, MAX_JSON_BYTES).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FormatError(f"{file}: is no list, which is text in UTF-8") from error
     pairs: dict[str, PicturePair] = {}
-    for line in parse_list(text, str(file), VIEWS).lines:
+    for line in read_list(file, VIEWS).lines:
         left, right = (file.parent / line.files[view].replace("\\", "/") for view in VIEWS)
         for path in (left, right):
             if not path.is_file():

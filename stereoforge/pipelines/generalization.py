@@ -87,14 +87,13 @@ def generalization_rows(evaluated: EvaluatedSet) -> list[GeneralizationRow]:
     return rows
 
 
-def write_generalization(sets: Sequence[EvaluatedSet], folder: Path) -> Path:
-    """Write the table of all sets as generalization.csv into a folder, and return the file."""
+def write_generalization(rows: Sequence[GeneralizationRow], folder: Path) -> Path:
+    """Write rows as generalization.csv into a folder, and return the file."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for evaluated in sets:
-        for row in generalization_rows(evaluated):
-            writer.writerow([getattr(row, name) for name in COLUMNS])
+    for row in rows:
+        writer.writerow([getattr(row, name) for name in COLUMNS])
     path = folder / "generalization.csv"
     write_text(path, text.getvalue())
     return path

@@ -14,9 +14,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from datagen.errors import DatasetError, FormatError
-from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
-from datagen.sources.own_data.listing import ListLine, PairList, parse_list
+from datagen.errors import DatasetError
+from datagen.sources.own_data.listing import ListLine, PairList, read_list
 from datagen.sources.own_data.names import pair_keys
 from datagen.sources.own_data.pairs import SCALE, PairFiles, reading_remarks, units_of
 from datagen.sources.registry import SourceFormat
@@ -34,11 +33,7 @@ def _open(location: str, root: str | None) -> tuple[PairList, list[PairFiles]]:
         raise DatasetError(
             f"{file}: is a folder, not a list; folder:{file} takes it by the names of its files"
         )
-    try:
-        text = read_bounded(file, MAX_JSON_BYTES).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FormatError(f"{file}: is no list, which is text in UTF-8") from error
-    listed = parse_list(text, str(file))
+    listed = read_list(file)
     folder = Path(os.path.abspath(file.parent if root is None else root))  # noqa: PTH100 (Links stay as they are.)
     if not folder.is_dir():
         raise DatasetError(f"{file}: root={root} is no folder")

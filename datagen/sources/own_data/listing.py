@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
-from datagen.errors import DatasetError
+from datagen.errors import DatasetError, FormatError
+from datagen.formats.limits import MAX_JSON_BYTES, read_bounded
 from datagen.sources.own_data.names import Role, column_role, parts_of
 from stereoforge_kit.messages import listed
 
@@ -41,6 +42,15 @@ class PairList:
     columns: tuple[Role | None, ...]
     separator: str
     """In words."""
+
+
+def read_list(file: Path, needed: tuple[Role, ...] = WITH_DISPARITY) -> PairList:
+    """Read a list as `parse_list` parses it. Raises FormatError for a file that is no text in UTF-8."""
+    try:
+        text = read_bounded(file, MAX_JSON_BYTES).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{file}: is no list, which is text in UTF-8") from error
+    return parse_list(text, str(file), needed)
 
 
 def parse_list(text: str, origin: str, needed: tuple[Role, ...] = WITH_DISPARITY) -> PairList:

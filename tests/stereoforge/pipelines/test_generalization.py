@@ -64,7 +64,7 @@ def test_figures_are_the_means_of_the_frames(family: str, tmp_path: Path) -> Non
     assert row.frames == 3
     assert row.outlier_px == threshold
 
-    lines = list(csv.DictReader(write_generalization(sets, tmp_path).open()))
+    lines = list(csv.DictReader(write_generalization([row], tmp_path).open()))
     assert list(lines[0]) == list(COLUMNS)
     assert float(lines[0]["all"]) == pytest.approx(row.all)
 
