@@ -18,6 +18,7 @@ from stereoforge.inputs.results_folder import claim_results
 from stereoforge.inputs.rig_flags import KnownRig, known_rig
 from stereoforge.inputs.stereo_pairs import StereoPair, StereoPairs, open_pairs
 from stereoforge.inputs.videos import VideoPairs
+from stereoforge.pipelines.refined_names import FILES, OVERVIEW
 from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console, progress_bar, remark
 
@@ -133,7 +134,6 @@ class Refine:
 
     def _refine_all(self, refiner: StereoRefiner, pairs: StereoPairs, rig: KnownRig | None) -> None:
         """Refine the pairs of two folders or videos but for those that are there already."""
-        from stereoforge.pipelines.refined_files import OVERVIEW
         from stereoforge.pipelines.side_by_side import write_video
 
         claim_results(self.out, self._settings(refiner, rig), "--out")
@@ -170,7 +170,7 @@ class Refine:
         left, right, remarks = pair.read()
         remarks += (odd := pair_doubts(left, right))
         from stereoforge.inputs.disparity_files import read_disparity
-        from stereoforge.pipelines.refined_files import OVERVIEW, write_refined
+        from stereoforge.pipelines.refined_files import write_refined
 
         size = (left.shape[0], left.shape[1])
         given: list[NDArray[np.float32] | None] = []
@@ -214,8 +214,6 @@ class Refine:
                 keep_apart("--out", self.out, flag, read)
         if not 0 <= self.min_confidence <= 1:
             raise UsageError(f"--min-confidence must lie between 0 and 1, got {self.min_confidence}")
-        from stereoforge.pipelines.refined_files import FILES
-
         for name in (*FILES, SIDE_BY_SIDE):
             keep_apart("--out", self.out / name, "LEFT", self.left)
             keep_apart("--out", self.out / name, "RIGHT", self.right)

@@ -16,26 +16,10 @@ from datagen.formats.point_cloud import write_point_cloud
 from datagen.ground_truth.labels import gradient_validity
 from refine.report.overview import overview_picture
 from stereoforge.pipelines.prediction import Image
+from stereoforge.pipelines.refined_names import DISPARITY, OVERVIEW
 from stereoforge.pipelines.refiner import RefinedPair
 from stereoforge_kit.files import replacing
 
-DISPARITY = "disparity.pfm"
-"""The refined disparity."""
-OVERVIEW = "overview.png"
-"""Written last: where it is, all the others are."""
-FILES = (
-    DISPARITY,
-    "disparity_initial.pfm",
-    "confidence.pfm",
-    "deviation.pfm",
-    "gradient.exr",
-    "depth.exr",
-    "depth.npy",
-    "depth.png",
-    "points.ply",
-    OVERVIEW,
-)
-"""All that a pair can have."""
 STEP_PX = 1.0
 """A pixel whose disparity differs by more from a neighbour's lies at the edge of a surface, and its point may hang in
 the air between that surface and the next."""

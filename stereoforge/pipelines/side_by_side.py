@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from datagen.formats import read_pfm
 from stereoforge.inputs.stereo_pairs import StereoPairs
-from stereoforge.pipelines.refined_files import DISPARITY
+from stereoforge.pipelines.refined_names import DISPARITY
 from stereoforge_kit.files import replacing
 from stereoforge_kit.viewing import disparity_picture
 
