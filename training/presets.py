@@ -256,9 +256,9 @@ RIG_AUGMENTATION = AugmentationConfig(
 
 SMALL_COSTVOLUME = RegressorPreset(
     steps=12_000,
-    batch_size=4,
-    crop_width=320,
-    crop_height=160,
+    batch_size=2,
+    crop_width=448,
+    crop_height=256,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=300),
     augmentation=RIG_AUGMENTATION,
     network=CostVolumeConfig(),
@@ -270,6 +270,8 @@ SMALL_COSTVOLUME = RegressorPreset(
 TINY_COSTVOLUME = replace(
     SMALL_COSTVOLUME,
     steps=600,
+    crop_width=320,
+    crop_height=160,
     augmentation=SMALL_AUGMENTATION,
     optimizer=replace(SMALL_COSTVOLUME.optimizer, learning_rate=2e-3, warmup_steps=40),
     validation_interval=200,
@@ -292,11 +294,12 @@ FULL_COSTVOLUME = replace(
     ),
     network=CostVolumeConfig(
         stem=32,
-        encoder=(64, 96, 128),
+        encoder=(64, 96, 128, 192),
         descriptor_groups=8,
-        aggregation=(16, 32, 64),
+        aggregation=(16, 32, 64, 64),
         look_groups=4,
         look_channels=64,
+        full_channels=24,
     ),
     validation_interval=5000,
 )

@@ -61,7 +61,7 @@ class Train:
     validation: Annotated[tuple[str, ...], shown("DATA", "the val splits of --data")] = ()
     """Data sets that decide which weights are kept."""
     crop: Annotated[str | None, shown("WxH", "the preset's")] = None
-    """Size of the training crops, multiples of 64 (for costvolume, of 16); KITTI's frames need 320 rows or fewer."""
+    """Size of the training crops, multiples of 64 (for costvolume, of 32); KITTI's frames need 320 rows or fewer."""
     batch_size: Annotated[int | None, shown("N", "the preset's, 4")] = None
     """Crops in an optimizer step."""
     learning_rate: Annotated[float | None, shown("RATE", "the preset's")] = None

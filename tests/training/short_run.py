@@ -16,7 +16,9 @@ VALIDATION_INTERVAL = 5  # steps; also between checkpoints
 
 NARROW: dict[str, RegressorConfig] = {
     "dispnet": DispNetConfig(width=0.0625),
-    "costvolume": CostVolumeConfig(stem=4, encoder=(8, 8, 8), aggregation=(4, 4, 4), look_channels=8),
+    "costvolume": CostVolumeConfig(
+        stem=4, encoder=(8, 8, 8, 8), aggregation=(4, 4, 4, 4), look_channels=8, full_channels=4
+    ),
 }
 
 

@@ -25,7 +25,7 @@ def normalized_groups(maps: Tensor, groups: int) -> Tensor:
     """
     batch, channels, height, width = maps.shape
     grouped = maps.view(batch, groups, channels // groups, height, width)
-    return F.normalize(grouped, dim=2, eps=1e-4)
+    return F.normalize(grouped.float(), dim=2, eps=1e-4)
 
 
 def cosine_volume(left: Tensor, right: Tensor, levels: int) -> Tensor:

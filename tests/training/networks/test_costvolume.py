@@ -13,39 +13,49 @@ from training.networks.regressors.costvolume import CostVolumeObjective
 from training.networks.regressors.registry import find_regressor, known_regressors, regressor_for
 
 HEIGHT, WIDTH = 64, 128
-NARROW = CostVolumeConfig(stem=4, encoder=(8, 8, 8), aggregation=(4, 4, 4), look_channels=8)
+NARROW = CostVolumeConfig(
+    stem=4, encoder=(8, 8, 8, 8), aggregation=(4, 4, 4, 4), look_channels=8, full_channels=4
+)
 
 # name: kernel, stride, dilation, in, out, denominator of the output's resolution
 TABLE = {
     "descriptors.stem.0": (3, 2, 1, 3, 16, 2),
     "descriptors.stem.1": (3, 1, 1, 16, 16, 2),
-    "descriptors.down4.0": (3, 2, 1, 16, 32, 4),
-    "descriptors.down4.1.first": (3, 1, 1, 32, 32, 4),
-    "descriptors.down4.1.second": (3, 1, 1, 32, 32, 4),
-    "descriptors.down8.0": (3, 2, 1, 32, 48, 8),
-    "descriptors.down8.1.first": (3, 1, 1, 48, 48, 8),
-    "descriptors.down8.1.second": (3, 1, 1, 48, 48, 8),
-    "descriptors.down16.0": (3, 2, 1, 48, 64, 16),
-    "descriptors.down16.1.first": (3, 1, 1, 64, 64, 16),
-    "descriptors.down16.1.second": (3, 1, 1, 64, 64, 16),
-    "descriptors.up8": (3, 1, 1, 112, 48, 8),
-    "descriptors.up4": (3, 1, 1, 80, 32, 4),
+    "descriptors.down.0.0": (3, 2, 1, 16, 32, 4),
+    "descriptors.down.0.1.first": (3, 1, 1, 32, 32, 4),
+    "descriptors.down.0.1.second": (3, 1, 1, 32, 32, 4),
+    "descriptors.down.1.0": (3, 2, 1, 32, 48, 8),
+    "descriptors.down.1.1.first": (3, 1, 1, 48, 48, 8),
+    "descriptors.down.1.1.second": (3, 1, 1, 48, 48, 8),
+    "descriptors.down.2.0": (3, 2, 1, 48, 64, 16),
+    "descriptors.down.2.1.first": (3, 1, 1, 64, 64, 16),
+    "descriptors.down.2.1.second": (3, 1, 1, 64, 64, 16),
+    "descriptors.down.3.0": (3, 2, 1, 64, 64, 32),
+    "descriptors.down.3.1.first": (3, 1, 1, 64, 64, 32),
+    "descriptors.down.3.1.second": (3, 1, 1, 64, 64, 32),
+    "descriptors.up.2": (3, 1, 1, 128, 64, 16),
+    "descriptors.up.1": (3, 1, 1, 112, 48, 8),
+    "descriptors.up.0": (3, 1, 1, 80, 32, 4),
     "descriptors.describe_quarter": (1, 1, 1, 32, 32, 4),
     "descriptors.context": (3, 1, 1, 48, 24, 2),
     "descriptors.describe_half": (1, 1, 1, 24, 16, 2),
-    "aggregation.enter4": (3, 1, 1, 4, 8, 4),
-    "aggregation.enter8.0": (3, 2, 1, 8, 16, 8),
-    "aggregation.enter8.1": (3, 1, 1, 16, 16, 8),
-    "aggregation.enter16.0": (3, 2, 1, 16, 32, 16),
-    "aggregation.enter16.1": (3, 1, 1, 32, 32, 16),
-    "aggregation.enter16.2": (3, 1, 1, 32, 32, 16),
-    "aggregation.gate4": (1, 1, 1, 32, 8, 4),
-    "aggregation.gate8": (1, 1, 1, 48, 16, 8),
-    "aggregation.gate16": (1, 1, 1, 64, 32, 16),
-    "aggregation.narrow16": (1, 1, 1, 32, 16, 16),
-    "aggregation.leave8": (3, 1, 1, 16, 16, 8),
-    "aggregation.narrow8": (1, 1, 1, 16, 8, 8),
-    "aggregation.leave4": (3, 1, 1, 8, 8, 4),
+    "aggregation.enter.0": (3, 1, 1, 4, 8, 4),
+    "aggregation.enter.1.0": (3, 2, 1, 8, 16, 8),
+    "aggregation.enter.1.1": (3, 1, 1, 16, 16, 8),
+    "aggregation.enter.2.0": (3, 2, 1, 16, 32, 16),
+    "aggregation.enter.2.1": (3, 1, 1, 32, 32, 16),
+    "aggregation.enter.3.0": (3, 2, 1, 32, 32, 32),
+    "aggregation.enter.3.1": (3, 1, 1, 32, 32, 32),
+    "aggregation.gate.0": (1, 1, 1, 32, 8, 4),
+    "aggregation.gate.1": (1, 1, 1, 48, 16, 8),
+    "aggregation.gate.2": (1, 1, 1, 64, 32, 16),
+    "aggregation.gate.3": (1, 1, 1, 64, 32, 32),
+    "aggregation.narrow.2": (1, 1, 1, 32, 32, 32),
+    "aggregation.leave.2": (3, 1, 1, 32, 32, 16),
+    "aggregation.narrow.1": (1, 1, 1, 32, 16, 16),
+    "aggregation.leave.1": (3, 1, 1, 16, 16, 8),
+    "aggregation.narrow.0": (1, 1, 1, 16, 8, 8),
+    "aggregation.leave.0": (3, 1, 1, 8, 8, 4),
     "aggregation.score": (1, 1, 1, 8, 1, 4),
     "half_weights.0": (3, 1, 1, 32, 32, 4),
     "half_weights.1": (1, 1, 1, 32, 36, 4),
@@ -61,6 +71,15 @@ TABLE = {
     "look.decide": (3, 1, 1, 32, 8, 2),
     "look.weights.0": (3, 1, 1, 24, 32, 2),
     "look.weights.1": (1, 1, 1, 32, 36, 2),
+    "full_look.narrow": (1, 1, 1, 24, 16, 2),
+    "full_look.stem": (3, 1, 1, 3, 16, 1),
+    "full_look.join": (3, 1, 1, 16, 16, 1),
+    "full_look.describe": (1, 1, 1, 16, 8, 1),
+    "full_look.layers.0": (3, 1, 1, 30, 16, 1),
+    "full_look.layers.1.first": (3, 1, 1, 16, 16, 1),
+    "full_look.layers.1.second": (3, 1, 1, 16, 16, 1),
+    "full_look.layers.2": (3, 1, 2, 16, 16, 1),
+    "full_look.decide": (3, 1, 1, 16, 6, 1),
 }
 
 
@@ -81,14 +100,21 @@ def test_the_layers_are_those_of_the_table() -> None:
     assert {
         name.removesuffix(".0") if name not in TABLE else name: row for name, row in found.items()
     } == TABLE
-    assert sum(p.numel() for p in network.parameters()) == 471_897
+    assert sum(p.numel() for p in network.parameters()) == 730_855
     parts = {name: sum(p.numel() for p in part.parameters()) for name, part in network.named_children()}
-    assert parts == {"descriptors": 266_832, "aggregation": 93_113, "half_weights": 10_468, "look": 101_484}
+    assert parts == {
+        "descriptors": 451_664,
+        "aggregation": 151_673,
+        "half_weights": 10_468,
+        "look": 101_484,
+        "full_look": 15_566,
+    }
 
 
 def test_a_new_network_begins_with_the_volumes_disparity() -> None:
     torch.manual_seed(0)
     output = CostVolumeNet(NARROW)(*torch.rand(2, 2, 3, 32, 64))
+    torch.testing.assert_close(output.coarse, output.half)
     torch.testing.assert_close(output.coarse, output.disparity)
 
 
@@ -98,8 +124,8 @@ def test_pictures_of_any_size_are_padded_not_resized(height: int, width: int) ->
     torch.manual_seed(0)
     network = CostVolumeNet(NARROW).eval()
     left, right = torch.rand(2, 1, 3, height, width)
-    rows = torch.arange(-(-height // 16) * 16).clamp(max=height - 1)
-    columns = torch.arange(-(-width // 16) * 16).clamp(max=width - 1)
+    rows = torch.arange(-(-height // 32) * 32).clamp(max=height - 1)
+    columns = torch.arange(-(-width // 32) * 32).clamp(max=width - 1)
     with torch.no_grad():
         whole = regress(network, left[:, :, rows][..., columns], right[:, :, rows][..., columns]).disparity
     found = estimate(network, None, None, left, right).disparity
@@ -109,9 +135,9 @@ def test_pictures_of_any_size_are_padded_not_resized(height: int, width: int) ->
 def test_the_range_can_be_set_and_changes_no_weights() -> None:
     network = CostVolumeNet(NARROW).eval()
     left, right = torch.rand(2, 1, 3, 32, 160)
-    assert network(left, right).scores.shape[-1] == 80 // 4
+    assert network(left, right).scores.shape[-1] == 64 // 4
     network.look_up_to(100)
-    assert network(left, right).scores.shape[-1] == 112 // 4
+    assert network(left, right).scores.shape[-1] == 128 // 4
     with pytest.raises(TrainingError, match="must be positive"):
         network.look_up_to(0)
     with pytest.raises(TrainingError, match="as far as it was trained to"):
@@ -119,7 +145,7 @@ def test_the_range_can_be_set_and_changes_no_weights() -> None:
 
 
 @pytest.mark.parametrize(
-    ("width", "pixels"), [(16, 32), (320, 160), (450, 192), (1248, 192), (1920, 240), (2960, 368)]
+    ("width", "pixels"), [(32, 32), (320, 160), (450, 192), (1248, 192), (1920, 224), (2976, 352)]
 )
 def test_the_range_suits_the_width(width: int, pixels: int) -> None:
     assert CostVolumeNet(NARROW).disparity_range(width) == pixels
@@ -127,23 +153,19 @@ def test_the_range_suits_the_width(width: int, pixels: int) -> None:
 
 def test_wide_pictures_are_searched_at_half_their_size_and_looked_at_at_full() -> None:
     network = CostVolumeNet(NARROW).eval()
-    left, right = torch.rand(2, 1, 3, 48, 144)
+    left, right = torch.rand(2, 1, 3, 96, 160)
     whole = network(left, right)
-    network.widest_volume_px = 80
+    network.widest_volume_px = 100
     output = network(left, right)
-    assert whole.scores.shape == (1, 12, 36, 16)
-    assert output.scores.shape == (
-        1,
-        8,
-        20,
-        8,
-    )  # 24x72, padded to multiples of 16; half the range, in levels of 4
-    assert output.disparity.shape == whole.disparity.shape == (1, 1, 48, 144)
+    assert whole.scores.shape == (1, 24, 40, 16)
+    # 48x80, padded to multiples of 32; half the range, in levels of 4
+    assert output.scores.shape == (1, 16, 24, 8)
+    assert output.disparity.shape == whole.disparity.shape == (1, 1, 96, 160)
     assert output.joined.shape == whole.joined.shape
 
 
 def test_the_wrong_size_is_refused() -> None:
-    with pytest.raises(ValueError, match="multiple of 16"):
+    with pytest.raises(ValueError, match="multiple of 32"):
         CostVolumeNet(NARROW)(*torch.rand(2, 1, 3, 32, 40))
 
 

@@ -34,7 +34,9 @@ SUMMARY = TrainingSummary(
 CONFIG = DispNetConfig(width=0.0625, normalization="batch")
 NARROW: dict[str, RegressorConfig] = {
     "dispnet": CONFIG,
-    "costvolume": CostVolumeConfig(stem=4, encoder=(8, 8, 8), aggregation=(4, 4, 4), look_channels=8),
+    "costvolume": CostVolumeConfig(
+        stem=4, encoder=(8, 8, 8, 8), aggregation=(4, 4, 4, 4), look_channels=8, full_channels=4
+    ),
 }
 
 

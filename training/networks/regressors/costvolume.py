@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import torch
@@ -48,24 +49,28 @@ READOUT_REACH = 2
 
 @dataclass(frozen=True)
 class CostVolumeConfig(RegressorConfig):
-    """Options of the network. The defaults are the preset `small` (472,000 parameters)."""
+    """Options of the network. The defaults are the preset `small` (640,000 parameters)."""
 
     stem: int = 16
     """Channels at 1/2."""
-    encoder: tuple[int, int, int] = (32, 48, 64)
-    """Channels at 1/4, 1/8 and 1/16."""
+    encoder: tuple[int, int, int, int] = (32, 48, 64, 64)
+    """Channels at 1/4, 1/8, 1/16 and 1/32."""
     descriptor_groups: int = 4
     """Groups of the descriptor at 1/4, each of which gives one volume of cosines."""
     group_channels: int = 8
-    """Channels of a group, at 1/4 and at 1/2."""
-    aggregation: tuple[int, int, int] = (8, 16, 32)
-    """Channels of the 3-D convolutions at 1/4, 1/8 and 1/16."""
+    """Channels of a group, at every resolution."""
+    aggregation: tuple[int, int, int, int] = (8, 16, 32, 32)
+    """Channels of the 3-D convolutions at 1/4, 1/8, 1/16 and 1/32."""
     look_groups: int = 2
     """Groups of the descriptor at 1/2."""
     look_reach: int = 3
     """Half-resolution pixels on either side of the volume's disparity that the second look compares."""
     look_channels: int = 32
     """Channels of the second look."""
+    full_reach: int = 2
+    """Pixels on either side of the second look's disparity that the third look compares."""
+    full_channels: int = 16
+    """Channels of the third look."""
 
 
 class CostVolumeOutput(NamedTuple):
@@ -75,8 +80,10 @@ class CostVolumeOutput(NamedTuple):
     """(B, H/4, W/4, D) logits of the disparities 0, 4, 8, ... px."""
     coarse: Tensor
     """(B, 1, H, W) px: the volume's disparity."""
+    half: Tensor
+    """(B, 1, H, W) px after the second look, at 1/2 of the resolution."""
     disparity: Tensor
-    """(B, 1, H, W) px after the second look; not clipped at zero."""
+    """(B, 1, H, W) px after the third look, at full resolution; not clipped at zero."""
     joined: Tensor
     """(B, F, H/2, W/2): what the second look decides from, the volume's certainty, and as the last channel the
     disparity in pixels."""
@@ -86,7 +93,7 @@ class CostVolumeOutput(NamedTuple):
 
 @dataclass(frozen=True)
 class CostVolumeObjective(Objective):
-    """Smooth L1 of both disparities, and cross-entropy of the volume."""
+    """Smooth L1 of the three disparities, and cross-entropy of the volume."""
 
     cross_entropy: float = 1.0
     """Weight of the volume's cross-entropy against a Laplacian about the ground truth."""
@@ -95,9 +102,9 @@ class CostVolumeObjective(Objective):
     coarse_beta_px: float = 1.0
     """Errors of the volume's disparity below this count by their squares."""
     beta_px: float = 0.3
-    """Errors of the final disparity below this count by their squares."""
+    """Errors of the disparities after the second and the third look below this count by their squares."""
     mendable_px: float = 8.0
-    """The second look cannot mend larger errors of the volume; such pixels count with weight `unmendable`."""
+    """The looks cannot mend larger errors of the volume; such pixels count with weight `unmendable`."""
     unmendable: float = 0.1
     """Weight of pixels with larger errors."""
 
@@ -107,17 +114,17 @@ class CostVolumeObjective(Objective):
         limit = float(CELL * (output.scores.shape[-1] - 1))
         truth = torch.where(disparity <= limit, disparity, torch.nan)
         mendable = (output.coarse.detach() - truth).abs() <= self.mendable_px
-        near, anywhere = torch.where(mendable, truth, torch.nan), self.unmendable
-        return (
-            self.cross_entropy * level_cross_entropy(output.scores, truth / CELL, self.spread_levels)
-            + disparity_smooth_l1(output.coarse, truth, self.coarse_beta_px)
-            + disparity_smooth_l1(output.disparity, near, self.beta_px)
-            + anywhere * disparity_smooth_l1(output.disparity, truth, self.beta_px)
-        )
+        near = torch.where(mendable, truth, torch.nan)
+        loss = self.cross_entropy * level_cross_entropy(output.scores, truth / CELL, self.spread_levels)
+        loss = loss + disparity_smooth_l1(output.coarse, truth, self.coarse_beta_px)
+        for looked in (output.half, output.disparity):
+            loss = loss + disparity_smooth_l1(looked, near, self.beta_px)
+            loss = loss + self.unmendable * disparity_smooth_l1(looked, truth, self.beta_px)
+        return loss
 
 
 class CostVolumeNet(Regressor):
-    """Disparity from a rectified pair, by a volume of cosines at 1/4 and a second look at 1/2 of the resolution.
+    """Disparity from a rectified pair: a volume of cosines at 1/4, a second look at 1/2 and a third at full resolution.
 
     Examples:
         >>> network = CostVolumeNet().eval()
@@ -131,7 +138,7 @@ class CostVolumeNet(Regressor):
     name = "costvolume"
     title = "CostVolumeNet"
     config_type = CostVolumeConfig
-    stride = 16
+    stride = 32
 
     max_disparity: int | None = None
     """What `look_up_to` set; None chooses by the images' width (`disparity_range`)."""
@@ -148,6 +155,7 @@ class CostVolumeNet(Regressor):
         self.aggregation = Aggregation(config)
         self.half_weights = nn.Sequential(_convolved(config.encoder[0], 32), nn.Conv2d(32, NEIGHBOURS * 4, 1))
         self.look = SecondLook(config)
+        self.full_look = ThirdLook(config)
         self.feature_channels: dict[FeatureKind, int] = {
             "joined": self.look.input_channels + 1,
             "decoded": config.look_channels,
@@ -155,15 +163,16 @@ class CostVolumeNet(Regressor):
         self.register_buffer("image_mean", torch.full((3,), 0.4))
         _initialize(self)
         self.look.begin_without_change()
+        self.full_look.begin_without_change()
 
     def forward(self, left: Tensor, right: Tensor) -> CostVolumeOutput:
         """Predict the left view's disparity.
 
         Args:
-            left, right: (B, 3, H, W) in 0..1, H and W multiples of 16.
+            left, right: (B, 3, H, W) in 0..1, H and W multiples of 32.
 
         Raises:
-            ValueError: the images differ in size, or a size is no multiple of 16.
+            ValueError: the images differ in size, or a size is no multiple of 32.
         """
         self.check_images(left, right)
         images = torch.cat([left, right]) - self.image_mean.view(1, 3, 1, 1)
@@ -174,8 +183,9 @@ class CostVolumeNet(Regressor):
         seen = self.look(half[0], half[1], context, coarse.detach(), matched.certainty)
         # Both are upsampled by one set of weights, so that the volume's error trains these from the first step.
         fine = [2 * convex_upsample(each, seen.weights, 2) for each in (coarse, seen.disparity)]
+        shift = self.full_look(images, views.context, fine[1].detach())
         joined = torch.cat([seen.inputs, 2 * seen.disparity.detach()], dim=1)
-        return CostVolumeOutput(matched.scores, fine[0], fine[1], joined, seen.features)
+        return CostVolumeOutput(matched.scores, fine[0], fine[1], fine[1] + shift, joined, seen.features)
 
     def _match(self, images: Tensor, views: Views, disparity_range: int) -> Matched:
         """Search the volume; that of images wider than `widest_volume_px` at half their size, and so on.
@@ -221,7 +231,7 @@ class CostVolumeNet(Regressor):
         return network
 
     def disparity_range(self, width: int) -> int:
-        """Disparities from 0 to below this many pixels are looked for, a multiple of 16.
+        """Disparities from 0 to below this many pixels are looked for, a multiple of 32.
 
         Where nothing was set, it is half of the width, but at most 192 px or, in wide images, an eighth
         of the width.
@@ -236,10 +246,10 @@ class CostVolumeNet(Regressor):
         wanted = self.max_disparity
         if wanted is None:
             wanted = min(width // 2, max(LARGEST_DISPARITY_PX, width // 8)) // self.stride * self.stride
-        return max(_whole(wanted, self.stride), 2 * self.stride)
+        return max(_whole(wanted, self.stride), self.stride)
 
     def regression(self, output: CostVolumeOutput) -> Regression:
-        """The disparity after the second look, and its features."""
+        """The disparity after the third look, and the second look's features."""
         features: dict[FeatureKind, Tensor] = {"joined": output.joined, "decoded": output.decoded}
         return Regression(F.relu(output.disparity), features)
 
@@ -253,39 +263,38 @@ class Views(NamedTuple):
     """(2B, C, H/2, W/2) descriptors."""
     context: Tensor
     """(2B, 24, H/2, W/2) features for upsampling and the second look."""
-    guides: tuple[Tensor, Tensor, Tensor]
-    """Features at 1/4, 1/8 and 1/16, which gate the volume."""
+    guides: tuple[Tensor, ...]
+    """Features at 1/4, 1/8, 1/16 and 1/32, which gate the volume."""
 
 
 class Descriptors(nn.Module):
-    """Features of one view: an encoder to 1/16, a decoder to 1/4, and descriptors at 1/4 and 1/2."""
+    """Features of one view: an encoder to 1/32, a decoder to 1/4, and descriptors at 1/4 and 1/2."""
 
     CONTEXT = 24
     """Channels of `Views.context`."""
 
     def __init__(self, config: CostVolumeConfig) -> None:
         super().__init__()
-        c2, (c4, c8, c16) = config.stem, config.encoder
+        c2, encoder = config.stem, config.encoder
+        c4 = encoder[0]
         self.stem = nn.Sequential(_convolved(3, c2, stride=2), _convolved(c2, c2))
-        self.down4 = nn.Sequential(_convolved(c2, c4, stride=2), Residual(c4))
-        self.down8 = nn.Sequential(_convolved(c4, c8, stride=2), Residual(c8))
-        self.down16 = nn.Sequential(_convolved(c8, c16, stride=2), Residual(c16))
-        self.up8 = _convolved(c16 + c8, c8)
-        self.up4 = _convolved(c8 + c4, c4)
+        self.down = nn.ModuleList(
+            nn.Sequential(_convolved(above, here, stride=2), Residual(here))
+            for above, here in pairwise((c2, *encoder))
+        )
+        self.up = nn.ModuleList(_convolved(below + here, here) for here, below in pairwise(encoder))
         self.describe_quarter = nn.Conv2d(c4, config.descriptor_groups * config.group_channels, 1)
         self.context = _convolved(c2 + c4, self.CONTEXT)
         self.describe_half = nn.Conv2d(self.CONTEXT, config.look_groups * config.group_channels, 1)
 
     def forward(self, views: Tensor) -> Views:
         """Describe views (2B, 3, H, W)."""
-        at2 = self.stem(views)
-        at4 = self.down4(at2)
-        at8 = self.down8(at4)
-        at16 = self.down16(at8)
-        at8 = self.up8(torch.cat([_doubled(at16), at8], dim=1))
-        at4 = self.up4(torch.cat([_doubled(at8), at4], dim=1))
-        context = self.context(torch.cat([at2, _doubled(at4)], dim=1))
-        return Views(self.describe_quarter(at4), self.describe_half(context), context, (at4, at8, at16))
+        at2 = maps = self.stem(views)
+        scales = [maps := down(maps) for down in self.down]
+        for scale in reversed(range(len(self.up))):
+            scales[scale] = self.up[scale](torch.cat([_doubled(scales[scale + 1]), scales[scale]], dim=1))
+        context = self.context(torch.cat([at2, _doubled(scales[0])], dim=1))
+        return Views(self.describe_quarter(scales[0]), self.describe_half(context), context, tuple(scales))
 
 
 class Aggregation(nn.Module):
@@ -293,36 +302,31 @@ class Aggregation(nn.Module):
 
     def __init__(self, config: CostVolumeConfig) -> None:
         super().__init__()
-        a4, a8, a16 = config.aggregation
-        g4, g8, g16 = config.encoder
-        self.enter4 = _convolved3d(config.descriptor_groups, a4)
-        self.enter8 = nn.Sequential(_convolved3d(a4, a8, stride=2), _convolved3d(a8, a8))
-        self.enter16 = nn.Sequential(
-            _convolved3d(a8, a16, stride=2), _convolved3d(a16, a16), _convolved3d(a16, a16)
+        channels = config.aggregation
+        self.enter = nn.ModuleList([_convolved3d(config.descriptor_groups, channels[0])])
+        for above, here in pairwise(channels):
+            self.enter.append(nn.Sequential(_convolved3d(above, here, stride=2), _convolved3d(here, here)))
+        self.gate = nn.ModuleList(
+            nn.Conv2d(guide, here, 1) for guide, here in zip(config.encoder, channels, strict=True)
         )
-        self.gate4, self.gate8 = nn.Conv2d(g4, a4, 1), nn.Conv2d(g8, a8, 1)
-        self.gate16 = nn.Conv2d(g16, a16, 1)
-        self.narrow16, self.leave8 = nn.Conv3d(a16, a8, 1), _convolved3d(a8, a8)
-        self.narrow8, self.leave4 = nn.Conv3d(a8, a4, 1), _convolved3d(a4, a4)
-        self.score = nn.Conv3d(a4, 1, 1)
+        self.narrow = nn.ModuleList(nn.Conv3d(below, here, 1) for here, below in pairwise(channels))
+        self.leave = nn.ModuleList(_convolved3d(here, here) for here in channels[:-1])
+        self.score = nn.Conv3d(channels[0], 1, 1)
 
     def forward(self, volume: Tensor, guides: list[Tensor]) -> Tensor:
-        """Scores (B, h, w, D) of a volume (B, G, h, w, D); h, w and D are multiples of 4.
+        """Scores (B, h, w, D) of a volume (B, G, h, w, D); h, w and D are multiples of 8.
 
         Args:
             volume: The cosines.
-            guides: The left view's features at 1/4, 1/8 and 1/16.
+            guides: The left view's features at 1/4, 1/8, 1/16 and 1/32.
         """
-        gates = [
-            torch.sigmoid(gate(guide))[..., None]
-            for gate, guide in zip((self.gate4, self.gate8, self.gate16), guides, strict=True)
-        ]
-        at4 = self.enter4(volume) * gates[0]
-        at8 = self.enter8(at4) * gates[1]
-        at16 = self.enter16(at8) * gates[2]
-        at8 = self.leave8(at8 + _doubled(self.narrow16(at16)))
-        at4 = self.leave4(at4 + _doubled(self.narrow8(at8)))
-        scores: Tensor = self.score(at4)[:, 0]
+        maps, scales = volume, []
+        for enter, gate, guide in zip(self.enter, self.gate, guides, strict=True):
+            maps = enter(maps) * torch.sigmoid(gate(guide))[..., None]
+            scales.append(maps)
+        for scale in reversed(range(len(self.leave))):
+            maps = self.leave[scale](scales[scale] + _doubled(self.narrow[scale](maps)))
+        scores: Tensor = self.score(maps)[:, 0]
         return scores.float()
 
 
@@ -348,6 +352,21 @@ class LookOutput(NamedTuple):
     """(B, F, h, w): what it decided from."""
     features: Tensor
     """(B, F, h, w): its last features."""
+
+
+def expected_shift(decision: Tensor, reach: int) -> Tensor:
+    """The shift that a look decides on: the expectation over its offsets, plus a free shift.
+
+    Args:
+        decision: (B, 2 reach + 2, h, w): logits of the offsets -reach .. reach, and the free shift.
+        reach: Largest offset in pixels.
+
+    Returns:
+        (B, 1, h, w) px.
+    """
+    offsets = torch.arange(-reach, reach + 1, device=decision.device, dtype=decision.dtype)
+    expectation = (decision[:, :-1].softmax(1) * offsets[:, None, None]).sum(1, keepdim=True)
+    return expectation + decision[:, -1:]
 
 
 class SecondLook(nn.Module):
@@ -396,11 +415,48 @@ class SecondLook(nn.Module):
         inputs = torch.cat([products, left, context, certainty, scaled], dim=1)
         features = self.layers(inputs)
         decision = self.decide(features).float()
-        offsets = torch.arange(-self.reach, self.reach + 1, device=left.device, dtype=decision.dtype)
-        shift = (decision[:, :-1].softmax(1) * offsets[:, None, None]).sum(1, keepdim=True)
-        return LookOutput(
-            disparity + shift + decision[:, -1:], self.weights(context).float(), inputs, features
+        looked = disparity + expected_shift(decision, self.reach)
+        return LookOutput(looked, self.weights(context).float(), inputs, features)
+
+
+class ThirdLook(nn.Module):
+    """Compares the views once more, at full resolution around the second look's disparity."""
+
+    def __init__(self, config: CostVolumeConfig) -> None:
+        super().__init__()
+        self.reach, channels = config.full_reach, config.full_channels
+        offsets = 2 * config.full_reach + 1
+        self.narrow = nn.Conv2d(Descriptors.CONTEXT, channels, 1)
+        self.stem = _convolved(3, channels)
+        self.join = _convolved(channels, channels)
+        self.describe = nn.Conv2d(channels, config.group_channels, 1)
+        self.layers = nn.Sequential(
+            _convolved(offsets + config.group_channels + channels + 1, channels),
+            Residual(channels),
+            _convolved(channels, channels, dilation=2),
         )
+        self.decide = nn.Conv2d(channels, offsets + 1, 3, 1, 1)
+
+    def begin_without_change(self) -> None:
+        """Set the weights of the decision to 0, so that the second look's disparity stays as it is."""
+        nn.init.zeros_(self.decide.weight)
+
+    def forward(self, images: Tensor, context: Tensor, disparity: Tensor) -> Tensor:
+        """What the second look's disparity should be changed by, (B, 1, H, W) px.
+
+        Args:
+            images: (2B, 3, H, W), the left ones first, mean 0.
+            context: (2B, 24, H/2, W/2) features of both views.
+            disparity: (B, 1, H, W) px after the second look.
+        """
+        features = self.join(self.stem(images) + _doubled(self.narrow(context)))
+        described = self.describe(features)
+        left, right = (normalized_groups(view, 1) for view in described.chunk(2))
+        products = windowed_cosines(left, right, disparity, self.reach)
+        scaled = disparity / 64  # of the size of the other inputs
+        inputs = [products, described.chunk(2)[0], features.chunk(2)[0], scaled]
+        decision = self.decide(self.layers(torch.cat(inputs, dim=1))).float()
+        return expected_shift(decision, self.reach)
 
 
 class Residual(nn.Module):
