@@ -64,6 +64,7 @@ $(BLENDER_5_2)/.installed: pyproject.toml constraints-blender-5.2.txt
 .venv/.installed: .venv/bin/python pyproject.toml $(CONSTRAINTS)
 	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable '.[all]'
 	@$(BIN)/python -c 'import bpy' >/dev/null 2>&1 || $(MAKE) --no-print-directory blender-libraries
+	$(BIN)/stereoforge warm-up
 	@touch $@
 
 .venv/.installed-dev: .venv/.installed

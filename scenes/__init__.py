@@ -1,16 +1,5 @@
 """Scenes as plain records, and the families that sample them. Needs neither Blender nor torch."""
 
-from scenes.family import Family, FamilyConfig
-from scenes.registry import FAMILIES, sample_scene
-from scenes.serialization import scene_from_json, scene_to_json
-from scenes.spec import Scene
+import lazy_loader
 
-__all__ = [
-    "FAMILIES",
-    "Family",
-    "FamilyConfig",
-    "Scene",
-    "sample_scene",
-    "scene_from_json",
-    "scene_to_json",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

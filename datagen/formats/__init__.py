@@ -6,38 +6,6 @@ that names the file; so does an array that the format cannot hold. A writer repl
 gives the same bytes for the same array.
 """
 
-from datagen.formats.camera_data import read_camera_data, write_camera_data
-from datagen.formats.cameras_json import cameras_record, read_cameras, write_cameras
-from datagen.formats.depth_exr import read_depth, write_depth
-from datagen.formats.flow import read_flow, write_flow
-from datagen.formats.gradient_exr import read_gradient, write_gradient
-from datagen.formats.normals_exr import read_normals, write_normals
-from datagen.formats.occlusion import read_occlusion, write_occlusion
-from datagen.formats.pfm import read_pfm, read_pfm_disparity, write_pfm
-from datagen.formats.pgm import read_mask, write_mask
-from datagen.formats.png import read_png, write_png
+import lazy_loader
 
-__all__ = [
-    "cameras_record",
-    "read_camera_data",
-    "read_cameras",
-    "read_depth",
-    "read_flow",
-    "read_gradient",
-    "read_mask",
-    "read_normals",
-    "read_occlusion",
-    "read_pfm",
-    "read_pfm_disparity",
-    "read_png",
-    "write_camera_data",
-    "write_cameras",
-    "write_depth",
-    "write_flow",
-    "write_gradient",
-    "write_mask",
-    "write_normals",
-    "write_occlusion",
-    "write_pfm",
-    "write_png",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from datagen.errors import DatasetError
 from datagen.sources.stereo_frame import StereoFrame
+from stereoforge_kit.messages import shortened
 
 _SELECTION = re.compile(r"(.+)#(\d{1,9})-(\d{1,9})")
 _FORMAT_NAME = re.compile(r"[A-Za-z][\w-]+")
@@ -156,9 +157,12 @@ def open_source(text: str | Path) -> DataSource:
                 formats[prefix], _existing(found, formats[prefix].takes_patterns), selection, options
             )
         if _FORMAT_NAME.fullmatch(prefix) and not rest.startswith("//"):
-            raise DatasetError(f"{location}: there is no format {prefix}; there are {_listed(formats)}")
+            raise DatasetError(
+                f"{shortened(location, 60)}: there is no format {prefix}; there are {_listed(formats)}"
+            )
     if "://" in location:
-        raise DatasetError(f"{location}: say what is there, for example webdataset:{location}")
+        where = shortened(location, 100)
+        raise DatasetError(f"{where}: say what is there, for example webdataset:{where}")
     location = _existing(location)
     folder = Path(location)
     fitting = [kind for kind in formats.values() if kind.recognises(folder)]
@@ -166,8 +170,7 @@ def open_source(text: str | Path) -> DataSource:
         what = " and ".join(kind.title for kind in fitting) or "no data set of a known layout"
         such_as = fitting[0].name if fitting else "folder" if folder.is_dir() else "list"
         raise DatasetError(
-            f"{folder}: looks like {what}; name the format in front, such as {such_as}:{folder} "
-            f"(there are {_listed(formats)})"
+            f"{shortened(location, 120)}: looks like {what}; name the format in front, such as {such_as}:PATH"
         )
     return DataSource(fitting[0], location, selection)
 

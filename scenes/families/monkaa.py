@@ -75,7 +75,16 @@ class MonkaaConfig(LandscapeConfig):
     Raises ValueError for ranges from which no scene can be sampled.
     """
 
-    crowd = ("creatures", "fur_locks", "undergrowth", "grass_tufts", "trees", "boulders")
+    crowd = (
+        "creatures",
+        "fur_locks",
+        "undergrowth",
+        "grass_tufts",
+        "trees",
+        "boulders",
+        "bushes",
+        "toadstools",
+    )
 
     focus_disparity_share: Range = (0.022, 0.076)
     """Disparity at the unit of depth, log-uniform, as a share of the image width (0.022 is 21 px at 960); it sets the
@@ -95,6 +104,10 @@ class MonkaaConfig(LandscapeConfig):
     """Trees and palms per scene, giant mushrooms among mushrooms, dripstones in caves."""
     boulders: Count = (6, 20)
     """Stones per scene."""
+    bushes: Count = (10, 18)
+    """Bushes far back that close the view, half as many again in the jungle; none in caves."""
+    toadstools: Count = (6, 16)
+    """Small mushrooms per scene, twice as many among giant ones; none in the jungle."""
     cave_share: float = 0.2
     """Share of the scenes that are in a cave, 0..1."""
     lamps: Count = (1, 4)
@@ -263,7 +276,7 @@ def _jungle(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None
     area = VegetationArea(plan.placement, plan.depth_m)
     kinds = [Palm.sample(rng) if chance(rng, 0.35) else _old_tree(rng) for _ in range(4)]
     trees(rng, area, kinds, integer(rng, *config.trees), (1.7, 9.0), (0.7, 1.6), [leaves()] * 3)
-    _thicket(rng, area, integer(rng, 18, 30), (4.0, 11.0), 1.2)
+    _thicket(rng, area, 3 * integer(rng, *config.bushes) // 2, (4.0, 11.0), 1.2)
     _vines(rng, plan, integer(rng, 4, 10))
 
 
@@ -273,8 +286,10 @@ def _meadow(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None
     kinds = [Palm.sample(rng) if chance(rng, 0.2) else _old_tree(rng) for _ in range(3)]
     count = max(2, integer(rng, *config.trees) // 2)
     trees(rng, area, kinds, count, (2.5, 12.0), (0.7, 1.6), [leaves()] * 2)
-    _thicket(rng, area, integer(rng, 8, 16), (5.0, 13.0), 0.8)
-    mushrooms(rng, area, "toadstool", integer(rng, 4, 12), (0.8, 4.0), (0.08, 0.25), 0.0, plan.shares)
+    _thicket(rng, area, integer(rng, *config.bushes), (5.0, 13.0), 0.8)
+    mushrooms(
+        rng, area, "toadstool", integer(rng, *config.toadstools), (0.8, 4.0), (0.08, 0.25), 0.0, plan.shares
+    )
 
 
 def _grove(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
@@ -282,8 +297,9 @@ def _grove(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
     area = VegetationArea(plan.placement, plan.depth_m)
     glow = uniform(rng, 0.1, 0.6) if chance(rng, 0.3) else 0.0
     mushrooms(rng, area, "giant", integer(rng, *config.trees), (1.6, 9.0), (0.5, 2.2), glow, plan.shares)
-    mushrooms(rng, area, "toadstool", integer(rng, 12, 26), (0.8, 4.0), (0.06, 0.4), glow, plan.shares)
-    _thicket(rng, area, integer(rng, 10, 18), (5.0, 12.0), 0.9)
+    toadstools = 2 * integer(rng, *config.toadstools)
+    mushrooms(rng, area, "toadstool", toadstools, (0.8, 4.0), (0.06, 0.4), glow, plan.shares)
+    _thicket(rng, area, integer(rng, *config.bushes), (5.0, 12.0), 0.9)
 
 
 def _cave_inside(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) -> None:
@@ -300,7 +316,9 @@ def _cave_inside(rng: np.random.Generator, config: MonkaaConfig, plan: _Plan) ->
             placement.hang(f"stalactite {index}", shape, stone, spot, 1.3 * _CAVE_RADIUS * d, scale_m)
     area = VegetationArea(placement, d)
     glow = uniform(rng, 0.3, 1.5)
-    mushrooms(rng, area, "toadstool", integer(rng, 6, 16), (0.8, 4.0), (0.08, 0.35), glow, plan.shares)
+    mushrooms(
+        rng, area, "toadstool", integer(rng, *config.toadstools), (0.8, 4.0), (0.08, 0.35), glow, plan.shares
+    )
 
 
 _PLANTS: dict[PropSampler, float] = {smooth_boulder: 1.0, broad_leaves: 2.0, toadstool: 1.5, outcrop: 1.0}

@@ -23,6 +23,7 @@ COMMANDS = {
     "evaluate": "Evaluate",
     "study": "Study",
     "demo": "Demo",
+    "warm-up": "WarmUp",
 }
 """Every command by its name, in the order of use, and its class in the module of that name."""
 

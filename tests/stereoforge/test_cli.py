@@ -123,6 +123,26 @@ def test_the_list_of_commands_imports_none_of_them() -> None:
         assert (command_class(name).__doc__ or "").startswith(summary)
 
 
+@pytest.mark.parametrize(
+    ("program", "heavy"),
+    [
+        ("from stereoforge.commands import refine", {"torch", "matplotlib", "numba", "trimesh", "bpy"}),
+        ("from stereoforge.commands import render", {"torch", "matplotlib", "bpy"}),
+        (
+            "from training.prediction.predictor import StereoPredictor\n"
+            "from stereoforge.bundled_weights import BUNDLED_WEIGHTS\n"
+            "StereoPredictor(BUNDLED_WEIGHTS)",
+            {"torch._dynamo", "bpy", "pytorch_lightning", "matplotlib"},
+        ),
+    ],
+    ids=["refine", "render", "networks"],
+)
+def test_what_takes_long_to_import_waits_until_it_is_needed(program: str, heavy: set[str]) -> None:
+    ask = f"{program}\nimport sys\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True)
+    assert not heavy & set(done.stdout.split())
+
+
 def test_the_version_is_told() -> None:
     done = subprocess.run([sys.executable, "-m", "stereoforge", "--version"], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, f"stereoforge {version('stereoforge')}\n")

@@ -9,6 +9,7 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
+from training.networks.initialization import initialize
 from training.networks.regressors.dispnet import LEAKY_SLOPE, Normalization
 from training.networks.regressors.interface import FeatureKind, Regressor
 
@@ -93,11 +94,7 @@ class PixelHead(nn.Module):
         layers += [nn.Dropout(config.dropout), nn.Conv2d(config.hidden, outputs, 1)]
         self.layers = nn.Sequential(*layers)
         slope = LEAKY_SLOPE if activation == "leaky_relu" else 0.0
-        for layer in self.layers:
-            if isinstance(layer, nn.Conv2d):
-                nn.init.kaiming_normal_(layer.weight, a=slope)
-                assert layer.bias is not None
-                nn.init.zeros_(layer.bias)
+        initialize(self.layers, slope)
 
     def joined_input(self, *inputs: Tensor) -> Tensor:
         """Resize all inputs to the working resolution and concatenate their channels, (B, C, h, w).

@@ -109,6 +109,6 @@ def _parts_to_freeze(network: Regressor, names: Sequence[str]) -> tuple[nn.Modul
     for name in names:
         if name not in parts:
             raise TrainingError(f"{network.title} has no part {name!r} to freeze; it has {', '.join(parts)}")
-    if set(names) == set(parts):
+    if names and set(names) == set(parts):
         raise TrainingError(f"with all parts of {network.title} frozen, there is nothing to train")
     return tuple(parts[name] for name in names)

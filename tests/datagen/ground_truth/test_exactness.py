@@ -108,6 +108,8 @@ def scenes_of(world: str, sizes: tuple[tuple[int, int, int], ...]) -> Iterator[S
             yield replace(scene, notes={**scene.notes, "own_rig": float(rig)})
 
 
+OPTIONS = RenderOptions(samples=4, targets=("reflective",))
+
 AT_NIGHT: dict[str, dict[str, Any]] = {
     "night rain": {"night_share": 1.0, "dusk_share": 0.0, "rain_share": 1.0, "transparent_share": 1.0}
 }
@@ -141,7 +143,7 @@ def pictures(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     made = []
     for scene in scenes_of(request.param, FEW):
         scratch = tmp_path_factory.mktemp("blender")
-        ((_, targets),) = render_frames(replace(scene, frames=1), scratch, RenderOptions(samples=4))
+        ((_, targets),) = render_frames(replace(scene, frames=1), scratch, OPTIONS)
         made.append(Picture(scene, targets, cycles_disparity(scene, scratch)))
     return made
 
@@ -309,9 +311,15 @@ def psnr(squared_errors: list[NDArray[np.float64]]) -> float:
     return float(10 * np.log10(255**2 / np.concatenate(squared_errors).mean()))
 
 
+def matte_labels(picture: Picture) -> NDArray[np.integer[Any]]:
+    """(H, W) the occlusion of the left view's matte pixels, -1 elsewhere: what a surface mirrors moves as it likes."""
+    targets = picture.targets["left"]
+    return np.where(targets.extra["reflective", None] > 0, -1, targets.occlusion.astype(int))
+
+
 @pytest.mark.slow
 def test_warping_right_to_left_reproduces_it_where_visible(pictures: list[Picture]) -> None:
-    labels = [w.targets["left"].occlusion for w in pictures]
+    labels = [matte_labels(w) for w in pictures]
     exact = [warp_error(w) for w in pictures]
     visible = psnr([e[m == VISIBLE] for e, m in zip(exact, labels, strict=True)])
     occluded = psnr([e[m == OCCLUDED] for e, m in zip(exact, labels, strict=True)])
@@ -323,7 +331,8 @@ def test_warping_right_to_left_reproduces_it_where_visible(pictures: list[Pictur
     )
     assert visible > 24.0
     assert occluded < visible - 6.0
-    assert half < visible - 1.0
+    # There is little contrast to move by half a pixel in the dark.
+    assert half < visible - (0.4 if all(w.scene.final.rain for w in pictures) else 1.0)
     assert wrong_sign < visible - 6.0
 
 

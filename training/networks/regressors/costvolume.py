@@ -27,6 +27,7 @@ from training.networks.cost_volume import (
     read_out,
     windowed_cosines,
 )
+from training.networks.initialization import initialize
 from training.networks.regressors.interface import (
     FeatureKind,
     Objective,
@@ -161,7 +162,7 @@ class CostVolumeNet(Regressor):
             "decoded": config.look_channels,
         }
         self.register_buffer("image_mean", torch.full((3,), 0.4))
-        _initialize(self)
+        initialize(self, LEAKY_SLOPE)
         self.look.begin_without_change()
         self.full_look.begin_without_change()
 
@@ -507,12 +508,3 @@ def _halved(images: Tensor, stride: int) -> tuple[Tensor, tuple[int, int]]:
     height, width = images.shape[-2] // 2, images.shape[-1] // 2
     missing = (0, _whole(width, stride) - width, 0, _whole(height, stride) - height)
     return F.pad(F.avg_pool2d(images, 2), missing, mode="replicate"), (height // 2, width // 2)
-
-
-def _initialize(network: nn.Module) -> None:
-    """He initialisation; biases 0."""
-    for layer in network.modules():
-        if isinstance(layer, nn.Conv2d | nn.Conv3d):
-            nn.init.kaiming_normal_(layer.weight, a=LEAKY_SLOPE)
-            if layer.bias is not None:
-                nn.init.zeros_(layer.bias)

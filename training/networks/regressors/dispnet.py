@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from training.losses import STAGE_WEIGHTS, ScaleWeights, multiscale_l1, stage_weights
 from training.networks.correlation import Correlation1D, ShiftedCorrelation1D
+from training.networks.initialization import initialize
 from training.networks.regressors.interface import (
     FeatureKind,
     Fitting,
@@ -282,15 +283,6 @@ def in_full_precision(layer: nn.Module, maps: Tensor) -> Tensor:
     with torch.autocast(maps.device.type, enabled=False):
         result: Tensor = layer(maps.float())
     return result
-
-
-def initialize(network: nn.Module) -> None:
-    """Initialise all convolutions as Caffe's MSRA filler does: normal, variance 2 / fan-in; biases 0."""
-    for layer in network.modules():
-        if isinstance(layer, nn.Conv2d | nn.ConvTranspose2d):
-            nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
-            if layer.bias is not None:
-                nn.init.zeros_(layer.bias)
 
 
 def full_resolution(disparity: Tensor, size: Sequence[int]) -> Tensor:

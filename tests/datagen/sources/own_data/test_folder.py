@@ -232,5 +232,5 @@ def test_damaged_and_odd_files_are_named(tmp_path: Path) -> None:
 
 def test_a_folder_is_offered_where_no_layout_is_known(tmp_path: Path) -> None:
     folder(tmp_path, *LAYOUTS["long names"])
-    with pytest.raises(DatasetError, match="name the format in front, such as folder:/"):
+    with pytest.raises(DatasetError, match="name the format in front, such as folder:PATH"):
         open_source(tmp_path)
