@@ -29,6 +29,7 @@ from training.data.batch import StereoBatch
 from training.data.pipeline import StereoDataModule, open_sources
 from training.losses import multiscale_l1
 from training.networks import ConfNet, DispNetConfig, GradNet, Regressor
+from training.networks.layout import faster_layout
 from training.networks.regressors.registry import regressor_for
 from training.presets import (
     PRESETS,
@@ -42,7 +43,6 @@ from training.presets import (
     RegressorPreset,
     find_preset,
 )
-from training.runs.hardware import faster_layout
 from training.tasks import (
     ConfNetTask,
     FineTuningTask,

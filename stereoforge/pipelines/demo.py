@@ -50,9 +50,7 @@ class DemoPlan:
         )
     )
     scenes: dict[str, int] = field(default_factory=lambda: {"train": 24, "val": 4, "test": 4})
-    steps: dict[str, int] = field(
-        default_factory=lambda: {"regressor": 600, "confnet": 200, "gradnet": 200}
-    )
+    steps: dict[str, int] = field(default_factory=lambda: {"regressor": 600, "confnet": 200, "gradnet": 200})
     """Training steps of each network's `tiny` preset."""
     samples: int = 2
     """Paths a pixel."""

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
 from training.devices import parse_device
 from training.errors import TrainingError
 from training.networks import ConfNet, GradNet, Regressor
 from training.networks.cost_features import CostFeatures
 from training.networks.inference import estimate
+from training.networks.layout import prepare_for_prediction
 from training.networks.regressor_free import RegressorFreeInputs, regressor_free_inputs
 from training.runs.weights import (
     has_weights,
@@ -76,6 +77,7 @@ class StereoPredictor:
             self._confnet = on_regressor(run, "confnet", load_confnet(run), stored.sha256).to(self._device)
         if regressor == "regressor" and has_weights(run, "gradnet"):
             self._gradnet = on_regressor(run, "gradnet", load_gradnet(run), stored.sha256).to(self._device)
+        _prepare(*self.networks)
 
     @property
     def networks(self) -> tuple[Regressor, ConfNet | None, GradNet | None]:
@@ -141,6 +143,7 @@ class RegressorFreePredictor:
             self._confnet = load_confnet(run, "confnet_free").network.to(self._device)
         if has_weights(run, "gradnet_free"):
             self._gradnet = load_gradnet(run, "gradnet_free").network.to(self._device)
+        _prepare(self._confnet, self._gradnet)
 
     @torch.no_grad()
     def predict(
@@ -183,6 +186,13 @@ class RegressorFreePredictor:
             seen = self._gradnet.inputs(inputs.features, cost_features)
             gradient = _as_array(self._gradnet(*seen))
         return Prediction(_as_array(inputs.disparity)[..., 0], confidence, gradient)
+
+
+def _prepare(*networks: nn.Module | None) -> None:
+    """Make the networks that there are faster."""
+    for network in networks:
+        if network is not None:
+            prepare_for_prediction(network)
 
 
 def check_images(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> None:

@@ -11,6 +11,7 @@ import torch
 from training.data.pipeline import StereoDataModule
 from training.errors import TrainingError
 from training.networks import ConfNet, GradNet, Regressor
+from training.networks.layout import faster_layout
 from training.networks.regressors.registry import regressor_for
 from training.presets import (
     ConfNetPreset,
@@ -21,7 +22,7 @@ from training.presets import (
     RegressorFreeGradNetPreset,
     RegressorPreset,
 )
-from training.runs.hardware import faster_layout, process_rank
+from training.runs.hardware import process_rank
 from training.runs.request import RunPlan
 from training.runs.run_folder import written_networks
 from training.runs.weights import (

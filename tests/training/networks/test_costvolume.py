@@ -164,6 +164,21 @@ def test_wide_pictures_are_searched_at_half_their_size_and_looked_at_at_full() -
     assert output.joined.shape == whole.joined.shape
 
 
+def test_the_third_look_takes_strips_where_nothing_is_trained() -> None:
+    """Whatever the strips' height, each row gets the answer of the whole picture."""
+    torch.manual_seed(0)
+    network = CostVolumeNet(NARROW).eval()
+    nn.init.normal_(network.full_look.decide.weight, std=0.3)
+    left, right = torch.rand(2, 1, 3, 224, 96)
+    whole = network(left, right).disparity  # with gradients: all at once
+    for rows in (None, 16, 96, 200):
+        network.strip_rows = rows
+        with torch.no_grad():
+            strips = network(left, right)
+        torch.testing.assert_close(strips.disparity, whole)
+    assert (strips.disparity - strips.half).abs().max() > 0.1
+
+
 def test_the_wrong_size_is_refused() -> None:
     with pytest.raises(ValueError, match="multiple of 32"):
         CostVolumeNet(NARROW)(*torch.rand(2, 1, 3, 32, 40))

@@ -72,9 +72,10 @@ def test_what_was_saved_predicts_the_same(
     assert expected.gradient is not None
     assert got.confidence is not None
     assert got.gradient is not None
-    np.testing.assert_array_equal(got.disparity, expected.disparity[0, 0])
-    np.testing.assert_array_equal(got.confidence, expected.confidence[0, 0])
-    np.testing.assert_array_equal(got.gradient, expected.gradient[0].permute(1, 2, 0))
+    # Up to rounding: for prediction, BatchNorm goes into the convolutions.
+    np.testing.assert_allclose(got.disparity, expected.disparity[0, 0], atol=1e-3)
+    np.testing.assert_allclose(got.confidence, expected.confidence[0, 0], atol=1e-4)
+    np.testing.assert_allclose(got.gradient, expected.gradient[0].permute(1, 2, 0), atol=1e-4)
     assert got.disparity.shape == (100, 150)
     assert got.gradient.shape == (100, 150, 2)
     assert read_summary(tmp_path, "regressor") == SUMMARY

@@ -146,6 +146,9 @@ class CostVolumeNet(Regressor):
     widest_volume_px: int | None = 1600
     """Wider images are searched at half their size, so that time and memory stay in bounds; None searches all at their
     own."""
+    strip_rows: int | None = 96
+    """Rows that the third look takes at a time where nothing is trained, since its maps at full resolution fit the
+    processor's cache then; None takes all at once."""
 
     def __init__(self, config: CostVolumeConfig | None = None) -> None:
         """Make the network with new weights; without a config, that of `small`."""
@@ -184,7 +187,8 @@ class CostVolumeNet(Regressor):
         seen = self.look(half[0], half[1], context, coarse.detach(), matched.certainty)
         # Both are upsampled by one set of weights, so that the volume's error trains these from the first step.
         fine = [2 * convex_upsample(each, seen.weights, 2) for each in (coarse, seen.disparity)]
-        shift = self.full_look(images, views.context, fine[1].detach())
+        strip_rows = None if torch.is_grad_enabled() else self.strip_rows
+        shift = self.full_look.in_strips(images, views.context, fine[1].detach(), strip_rows)
         joined = torch.cat([seen.inputs, 2 * seen.disparity.detach()], dim=1)
         return CostVolumeOutput(matched.scores, fine[0], fine[1], fine[1] + shift, joined, seen.features)
 
@@ -228,7 +232,7 @@ class CostVolumeNet(Regressor):
         """The network with one scale and one disparity range for every image size, 0 to 192 px where none was set."""
         network = copy.copy(self)
         network.max_disparity = self.max_disparity or LARGEST_DISPARITY_PX
-        network.widest_volume_px = None
+        network.widest_volume_px = network.strip_rows = None
         return network
 
     def disparity_range(self, width: int) -> int:
@@ -423,6 +427,9 @@ class SecondLook(nn.Module):
 class ThirdLook(nn.Module):
     """Compares the views once more, at full resolution around the second look's disparity."""
 
+    SEES_ROWS = 8
+    """Rows above and below a pixel that its shift depends on, an even number."""
+
     def __init__(self, config: CostVolumeConfig) -> None:
         super().__init__()
         self.reach, channels = config.full_reach, config.full_channels
@@ -441,6 +448,20 @@ class ThirdLook(nn.Module):
     def begin_without_change(self) -> None:
         """Set the weights of the decision to 0, so that the second look's disparity stays as it is."""
         nn.init.zeros_(self.decide.weight)
+
+    def in_strips(self, images: Tensor, context: Tensor, disparity: Tensor, rows: int | None) -> Tensor:
+        """`forward`, on so many rows at a time and those around them that they see; all at once if None."""
+        height = disparity.shape[-2]
+        if rows is None or height <= rows:
+            shift: Tensor = self(images, context, disparity)
+            return shift
+        strips = []
+        for top in range(0, height, rows):
+            first, last = max(top - self.SEES_ROWS, 0), min(top + rows + self.SEES_ROWS, height)
+            half = context[:, :, first // 2 : last // 2]
+            strip = self(images[:, :, first:last], half, disparity[:, :, first:last])
+            strips.append(strip[:, :, top - first : top - first + rows])
+        return torch.cat(strips, dim=2)
 
     def forward(self, images: Tensor, context: Tensor, disparity: Tensor) -> Tensor:
         """What the second look's disparity should be changed by, (B, 1, H, W) px.
