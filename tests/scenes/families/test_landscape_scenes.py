@@ -10,8 +10,10 @@ import pytest
 from datagen.ground_truth.scene_geometry import SceneGeometry, build_geometry
 from scenes import FAMILIES, sample_scene
 from scenes.landscapes.framing import FRAMINGS
-from scenes.landscapes.terrain import LandscapeConfig
-from scenes.shapes.nature.landforms import Landscape
+from scenes.landscapes.terrain import Land, LandscapeConfig
+from scenes.landscapes.water import water_size_m, with_pond
+from scenes.random_draws import uniform
+from scenes.shapes.nature.landforms import Landscape, eroded_relief
 from scenes.spec import Scene
 from tests.scenes.families.landscapes import first_hits, ground_below, world_vertices
 
@@ -113,6 +115,37 @@ def test_ponds_lie_in_basins_and_nothing_but_stones_stands_in_them(family: str) 
                     world_vertices(geometry, index, 0.0)[:, 2]
                 )
     assert found >= 2
+
+
+def test_the_edge_of_a_ponds_water_is_under_the_shore() -> None:
+    ponds = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        shape = Landscape(
+            0.15, uniform(rng, 0.0001, 0.0006), 0.2, uniform(rng, 3.0, 9.0), 7, 0.5, 120, 2.4, seed
+        )
+        land = with_pond(rng, Land(shape, uniform(rng, 30.0, 60.0)), 1.0, 1.0)
+        basin = land.shape.basin
+        if basin is None:
+            continue
+        ponds += 1
+        long_m, wide_m = water_size_m(land)
+        along, ends = np.linspace(-1.0, 1.0, 101), np.repeat([-1.0, 1.0], 101)
+        rim = np.concatenate(
+            [np.stack([np.tile(along, 2), ends], -1), np.stack([ends, np.tile(along, 2)], -1)]
+        )
+        cos, sin = np.cos(basin.heading_rad), np.sin(basin.heading_rad)
+        turned = rim * (long_m, wide_m) @ np.array([[cos, sin], [-sin, cos]])
+        assert (land.height_m(turned + np.array((basin.x, basin.y)) * land.half_m) > land.water_m).all(), seed
+    assert ponds > 6
+
+
+def test_eroded_land_has_no_steps() -> None:
+    """Along a line, heights hardly differ between points that are very near to each other."""
+    line = np.stack([np.linspace(-1.0, 1.0, 40_001), np.full(40_001, 0.3)], -1)
+    for seed in range(8):
+        heights = eroded_relief(np.random.default_rng(seed), line, 3.6, 3, 0.7)
+        assert np.abs(np.diff(heights)).max() < 0.01 * np.ptp(heights), seed
 
 
 @pytest.mark.parametrize("family", FAMILY_NAMES)
