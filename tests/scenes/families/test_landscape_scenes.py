@@ -6,15 +6,19 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from datagen.ground_truth.scene_geometry import SceneGeometry, build_geometry
 from scenes import FAMILIES, sample_scene
+from scenes.appearance.material_textures import fur
 from scenes.landscapes.framing import FRAMINGS
 from scenes.landscapes.terrain import Land, LandscapeConfig
 from scenes.landscapes.water import water_size_m, with_pond
+from scenes.motion.trajectories import quaternion
+from scenes.placement.ground import GroundPlacement
 from scenes.random_draws import uniform
 from scenes.shapes.nature.landforms import Landscape, eroded_relief
-from scenes.spec import Scene
+from scenes.spec import Scene, StereoCamera, Trajectory
 from tests.scenes.families.landscapes import first_hits, ground_below, world_vertices
 
 FAMILY_NAMES = ("monkaa", "sintel")
@@ -208,3 +212,16 @@ def test_nothing_stands_in_the_middle_of_a_character(family: str) -> None:
                     ("ground", "water", "cave", "bush", "tree", "ruin", "house")
                 ):
                     assert not ((heart > other_low) & (heart < other_high)).all(), (seed, body, other)
+
+
+def test_a_texture_may_have_a_largest_size() -> None:
+    land = Land(Landscape(0.15, 0.0003, 0.2, 6.0, 3, 0.5, 20, 2.4, 0), 40.0)
+    level = quaternion(Rotation.from_euler("X", 90.0, degrees=True))
+    camera = StereoCamera(96, 54, 35.0, 0.1, Trajectory.static((0.0, 0.0, 1.6), level))
+    placement = GroundPlacement(land, camera, 1, 1.0)
+    free, bound = (
+        placement.new_material(np.random.default_rng(0), fur, 3.0, 20.0, size=512, largest_m=most)
+        for most in (np.inf, 6.0)
+    )
+    assert placement.materials[free].repeats < 0.5
+    assert placement.materials[bound].repeats == pytest.approx(0.5)
