@@ -23,7 +23,7 @@ from scenes.shapes.street.roadside_plants import Shrub
 from scenes.spec import AreaLight, Color, Light, SunLight, World
 from scenes.textures.sky import Sky
 
-_GROUND_M = 80.0
+_GROUND_M = (70.0, 90.0)
 """How far the ground outside reaches away from the house, and to either side of a wall's middle."""
 
 
@@ -127,8 +127,9 @@ def add_outside(rng: np.random.Generator, interior: Interior) -> None:
         middle = plan.wall_length(wall) / 2
         material = scene.material(street_materials.skyline(rng))
         leaves = scene.material(street_materials.foliage(rng))
-        ground = RoomSlab(2 * _GROUND_M, _GROUND_M, "floor")
-        x, y = plan.at_wall(wall, middle - _GROUND_M, -_GROUND_M - 1.0)
+        reach = uniform(rng, *_GROUND_M)
+        ground = RoomSlab(2 * reach, reach, "floor")
+        x, y = plan.at_wall(wall, middle - reach, -reach - 1.0)
         # The grounds of two walls meet at a corner: no two of them are level with each other.
         low = (x, y, floor_z - 0.01 * wall)
         covered = scene.material(choose(rng, (street_materials.grass, street_materials.pavement))(rng))
