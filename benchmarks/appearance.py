@@ -1,6 +1,6 @@
 """How the pictures of a data set look, in numbers: textureless, clipped, black, reflective pixels, and disparities.
 
-    python benchmarks/appearance.py DIR [--split val]
+    python -m benchmarks.appearance DIR [--split val] [--render-pass clean]
 
 A pixel is textureless where the grey levels of the 5 x 5 pixels around it differ by at most `TEXTURELESS_LEVELS`,
 clipped where a channel is 255, black where one is 0. Figures are of the left views of all frames; the table gives
@@ -58,8 +58,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("data", type=Path)
     parser.add_argument("--split", default="val")
+    parser.add_argument("--render-pass", choices=("clean", "final"), default="clean")
     arguments = parser.parse_args()
-    figures = [measured(sample) for sample in StereoDataset(arguments.data, arguments.split)]
+    samples = StereoDataset(arguments.data, arguments.split, render_pass=arguments.render_pass)
+    figures = [measured(sample) for sample in samples]
     print(f"{len(figures)} frames | median | 5 % | 95 %")
     for name in figures[0]:
         middle, low, high = np.percentile([frame[name] for frame in figures], (50, 5, 95))

@@ -13,6 +13,10 @@ from numpy.typing import NDArray
 HIGHLIGHT_PERCENTILE = 98.0
 HIGHLIGHT_CEILING = 1.1
 """The exposure may raise that percentile of luminance to this at most, so that bright scenes keep their highlights."""
+HIGHLIGHT_STOPS = 1.0
+"""Highlights darken a picture by this many stops at most, as long as that leaves them below `CUT_OFF`."""
+CUT_OFF = 3.3
+"""Light, 1 being white, from which on a channel is 255."""
 KNEE = 0.4
 """Light up to this level, 1 being white, is developed as it is; brighter light is rolled off."""
 GLARE = 0.0015
@@ -23,7 +27,9 @@ _REC709 = np.array([0.2126, 0.7152, 0.0722], np.float32)
 def automatic_exposure(radiance: NDArray[np.float32], key: float) -> float:
     """The factor that brings the log-average luminance to `key` without burning out the highlights.
 
-    The rule is that of Reinhard et al., "Photographic tone reproduction for digital images" (SIGGRAPH 2002).
+    The rule is that of Reinhard et al., "Photographic tone reproduction for digital images" (SIGGRAPH 2002). A lamp in
+    a dark room does not turn the room black: a picture is `HIGHLIGHT_STOPS` darker than `key` at most, or as dark as
+    `100 - HIGHLIGHT_PERCENTILE` per cent of its pixels with a channel that is cut off demand.
 
     Args:
         radiance: (H, W, 3) linear RGB.
@@ -32,7 +38,10 @@ def automatic_exposure(radiance: NDArray[np.float32], key: float) -> float:
     luminance = radiance @ _REC709
     log_average = float(np.exp(np.mean(np.log(np.maximum(luminance, 1e-4)))))
     highlight = float(np.percentile(luminance, HIGHLIGHT_PERCENTILE))
-    return min(key / log_average, HIGHLIGHT_CEILING / max(highlight, 1e-4))
+    brightest = float(np.percentile(radiance.max(axis=2), HIGHLIGHT_PERCENTILE))
+    kept = HIGHLIGHT_CEILING / max(highlight, 1e-4)
+    darkest = min(2.0**-HIGHLIGHT_STOPS * key / log_average, CUT_OFF / max(brightest, 1e-4))
+    return min(key / log_average, max(kept, darkest))
 
 
 def develop(radiance: NDArray[np.float32], exposure: float) -> NDArray[np.uint8]:

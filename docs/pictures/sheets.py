@@ -54,7 +54,7 @@ def textures(rng: np.random.Generator) -> Iterator[tuple[str, Picture]]:
 def finishes(rng: np.random.Generator) -> Iterator[tuple[str, Picture]]:
     """Name and rendered picture of a ball in each finish."""
     for name, finish in FINISHES.items():
-        ranges = {field: limits for field, limits in vars(finish).items() if field != "share"}
+        ranges = {field: limits for field, limits in vars(finish).items() if isinstance(limits, tuple)}
         middle = {field: (low + high) / 2 for field, (low, high) in ranges.items()}
         scene = ball(Material(TEXTURES["Marble"].sample(rng, 256), 0.5, **middle), Checkers.sample(rng, 256))
         with tempfile.TemporaryDirectory() as scratch:

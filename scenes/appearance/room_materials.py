@@ -206,12 +206,13 @@ def stone(rng: np.random.Generator, shares: Shares) -> Material:
 
 
 def wood(rng: np.random.Generator, shares: Shares) -> Material:
-    """Furniture of wood, matte or varnished."""
+    """Furniture of wood, matte or varnished: boards glued so that their joints hardly show."""
     texture = replace(
         WoodPlanks.sample(rng, 256),
         palette=_wood_palette(rng, 2),
         planks=choose(rng, [1, 2, 3]),
         grain=0.025,
+        joint=uniform(rng, 0.0, 0.1),
     )
     return _finished(rng, shares, tiled(texture, uniform(rng, 0.4, 0.8)))
 

@@ -187,7 +187,7 @@ def _sample_plan(rng: np.random.Generator, config: MonkaaConfig) -> tuple[_Plan,
     land = _sample_land(rng, place, depth_m)
     if chance(rng, config.water_share):
         land = with_pond(rng, land, depth_m, framing.first_depth * depth_m)
-    high_m = uniform(rng, *framing.eye) * size_m
+    high_m = uniform(rng, *framing.camera_height) * size_m
     focus = sample_focus(rng, config, focal_mm, depth_m, size_m, high_m, framing.aim, framing.above)
     camera = sample_camera(rng, config, land, focus)
     placement = GroundPlacement(land, camera, config.frames, 1.15 * focus.nearest_m, land.water_m)

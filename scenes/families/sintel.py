@@ -146,7 +146,7 @@ def _sample_plan(rng: np.random.Generator, config: SintelConfig) -> tuple[_Plan,
     land = _sample_land(rng, place, unit_m)
     if place.water and chance(rng, config.water_share / WATERY):
         land = with_pond(rng, land, unit_m, framing.first_depth * unit_m)
-    high_m = uniform(rng, *framing.eye) * PERSON_M
+    high_m = uniform(rng, *framing.camera_height) * PERSON_M
     focus = sample_focus(rng, config, focal_mm, unit_m, PERSON_M, high_m, framing.aim, framing.above)
     camera = sample_camera(rng, config, land, focus)
     placement = GroundPlacement(land, camera, config.frames, 1.15 * focus.nearest_m, land.water_m)

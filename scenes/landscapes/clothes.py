@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -18,6 +19,8 @@ HEM = 0.045
 """Height of a robe's hem over the ground."""
 BELT = 0.565
 """Height of a belt."""
+_STRAND_GAP = 0.03
+"""Distance of the strands of a cloak at its hem; each is 0.044 thick."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,9 @@ def _cloak(rng: np.random.Generator, body: Skeleton, girth: float, trunk: int, *
     """A sheet from the shoulders down the back, in folds, a collar about the neck."""
     length, flare = uniform(rng, 0.28, 0.62), uniform(rng, 1.0, 1.6)
     end = max(0.76 - length, 0.4 if low else 0.12)
-    for across in np.linspace(-1.0, 1.0, 7):
+    # Strands so near to each other at the hem that they blend into one sheet.
+    strands = math.ceil(2 * flare * (girth + 0.03) / _STRAND_GAP) + 1
+    for across in np.linspace(-1.0, 1.0, strands):
         start = (-0.02 - 0.05 * (1 - across**2), float(across) * (girth + 0.035), 0.785)
         deep = -(girth + 0.03) - 0.045 * (1 - across**2) - 0.012 * float(np.cos(7.0 * across))
         stop = (deep * (1.0 - 0.35 * across**2), float(across) * flare * (girth + 0.03), end)

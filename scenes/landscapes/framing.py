@@ -30,7 +30,7 @@ class Framing:
     """Height at which the camera looks, relative to the character's."""
     above: Range = (-0.1, 0.25)
     """How far the camera looks above that, relative to half the vertical field of view."""
-    eye: Range = (0.35, 1.2)
+    camera_height: Range = (0.35, 1.2)
     """Height of the camera, relative to the character's height."""
 
     @property
@@ -47,7 +47,9 @@ def sample_framing(rng: np.random.Generator, config: LandscapeConfig, characters
     if kind == "near":
         # From the height of its chest, or it would stand before nothing but sky.
         close, aim = uniform(rng, 1.0, 1.6), uniform(rng, 0.6, 0.74)
-        return Framing(kind, close, count, (1.3, 4.5), aim=aim, above=(-0.25, 0.12), eye=(0.5, 0.95))
+        return Framing(
+            kind, close, count, (1.3, 4.5), aim=aim, above=(-0.25, 0.12), camera_height=(0.5, 0.95)
+        )
     if kind == "far":
         first = uniform(rng, 1.9, 4.5)
         return Framing(kind, high, count, (first, 1.8 * first), first, spread=0.8)

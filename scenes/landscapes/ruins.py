@@ -16,6 +16,9 @@ from scenes.placement.ground import GroundPlacement, Spot
 from scenes.random_draws import chance, choose, integer, new_seed, uniform
 from scenes.shapes.nature.masonry import Archway, BlockWall, Column, Steps
 
+_COURSES_M = 6.0
+"""Most that a texture of masonry, of about 20 courses, spans."""
+
 
 def add_ruins(
     rng: np.random.Generator,
@@ -31,7 +34,9 @@ def add_ruins(
     Distances are in units of `unit_m`. `samplers` are of dressed and of hewn stone; `ruin` scales their decay.
     """
     d, (dressed, hewn_stone) = unit_m, samplers
-    masonry_materials = [placement.new_material(rng, dressed, 2.0, 1.5 * d, size=512) for _ in range(2)]
+    masonry_materials = [
+        placement.new_material(rng, dressed, 3.0, 1.5 * d, size=512, largest_m=_COURSES_M) for _ in range(2)
+    ]
     hewn = placement.new_material(rng, hewn_stone, 2.0, 1.2 * d, size=512, finish=gloss_or_matte(rng, shares))
     for index in range(count):
         kind = choose(rng, (BlockWall, Archway, Steps, Column, "statue"), (0.3, 0.25, 0.12, 0.2, 0.13))

@@ -161,13 +161,13 @@ def sample_camera(
     circle = np.stack([np.cos(angle), np.sin(angle)], -1)
     around = np.concatenate([circle * share for share in (0.0, 0.5, 1.0)]) * (reach_m + baseline_m)
     above_m = max(focus.camera_height_m, reach_m + 0.4 * focus.camera_height_m)
-    eye_m = max(float(land.height_m(around).max()), land.water_m) + above_m
+    camera_z_m = max(float(land.height_m(around).max()), land.water_m) + above_m
     target_m = float(land.height_m(np.array([[0.0, focus.depth_m]]))[0]) + focus.aim * focus.size_m
-    pitch_deg = math.degrees(math.atan2(eye_m - target_m, focus.depth_m)) - focus.above_deg
+    pitch_deg = math.degrees(math.atan2(camera_z_m - target_m, focus.depth_m)) - focus.above_deg
     motion = wander(
         rng,
         config.frames,
-        np.array((-baseline_m / 2, 0.0, eye_m)),
+        np.array((-baseline_m / 2, 0.0, camera_z_m)),
         Rotation.from_euler("XZ", (90.0 - pitch_deg, uniform(rng, -2.0, 2.0)), degrees=True),
         speed_m=focus.speed_m,
         turn_deg=focus.turn_deg,

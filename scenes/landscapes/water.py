@@ -48,7 +48,7 @@ def add_water(rng: np.random.Generator, placement: GroundPlacement, land: Land, 
     basin = land.shape.basin
     if basin is None:
         return
-    long_m, wide_m = 1.04 * basin.long * land.half_m, 1.04 * basin.wide * land.half_m
+    long_m, wide_m = water_size_m(land)
     shape = WaterSurface(
         width=wide_m / long_m,
         wavelength=log_uniform(rng, 0.12, 0.5) * unit_m / long_m,
@@ -61,6 +61,17 @@ def add_water(rng: np.random.Generator, placement: GroundPlacement, land: Land, 
     spot = placement.spot_at(plan, basin.heading_rad)
     above_m = land.water_m - float(spot.ground_m[2])
     placement.stand("water", shape, material, spot, long_m, sunk_m=-above_m, checked=False)
+
+
+def water_size_m(land: Land) -> tuple[float, float]:
+    """Half the length and half the width of a pond's block of water.
+
+    It reaches under the shore everywhere: where the land's cells are coarse, the basin's mesh is wider than the basin.
+    """
+    basin = land.shape.basin
+    assert basin is not None
+    margin = 1.5 * land.shape.cell(max(abs(basin.x), abs(basin.y)) + basin.long)
+    return (1.04 * basin.long + margin) * land.half_m, (1.04 * basin.wide + margin) * land.half_m
 
 
 def _murk(rng: np.random.Generator, size: int) -> Texture:

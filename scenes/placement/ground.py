@@ -108,18 +108,19 @@ class GroundPlacement(Assembly):
         size: int = 256,
         finish: Finish = FINISHES["matte"],
         emission: float = 0.0,
+        largest_m: float = math.inf,
     ) -> int:
         """The index of a new material for things that stand at about `depth_m`.
 
         A unit of their texture coordinates is `unit_m` long; the texture, `size` pixels wide, repeats so that
-        its pixels are about as large as the image's.
+        its pixels are about as large as the image's, and at least every `largest_m`.
         """
         texture = texture_sampler(rng, size)
         unit_px = unit_m * self.view.camera.focal_px / depth_m
         return self.material(
             Material(
                 color=texture,
-                repeats=max(texture_repeats(rng, unit_px, size, _TEXEL_PX), 0.05),
+                repeats=max(texture_repeats(rng, unit_px, size, _TEXEL_PX), unit_m / largest_m, 0.05),
                 roughness=uniform(rng, *finish.roughness),
                 specular=uniform(rng, *finish.specular),
                 metallic=uniform(rng, *finish.metallic),

@@ -12,15 +12,19 @@ from scenes.appearance import street_materials
 from scenes.appearance.painting import shade
 from scenes.motion.trajectories import vector
 from scenes.placement.assembly import anchored_group
-from scenes.random_draws import chance, integer, uniform
+from scenes.random_draws import chance, choose, integer, uniform
 from scenes.rooms.config import IndoorConfig
 from scenes.rooms.interior import Interior, Placed
 from scenes.rooms.plan import Plan, RoomOpening
 from scenes.shapes.indoor.fixtures import CeilingLamp, Lamp
+from scenes.shapes.indoor.shell import RoomSlab
 from scenes.shapes.street.buildings import CityBlock
 from scenes.shapes.street.roadside_plants import Shrub
 from scenes.spec import AreaLight, Color, Light, SunLight, World
 from scenes.textures.sky import Sky
+
+_GROUND_M = (70.0, 90.0)
+"""How far the ground outside reaches away from the house, and to either side of a wall's middle."""
 
 
 @dataclass(frozen=True)
@@ -123,10 +127,19 @@ def add_outside(rng: np.random.Generator, interior: Interior) -> None:
         middle = plan.wall_length(wall) / 2
         material = scene.material(street_materials.skyline(rng))
         leaves = scene.material(street_materials.foliage(rng))
-        for k in range(integer(rng, 1, 3)):
+        reach = uniform(rng, *_GROUND_M)
+        ground = RoomSlab(2 * reach, reach, "floor")
+        x, y = plan.at_wall(wall, middle - reach, -reach - 1.0)
+        # The grounds of two walls meet at a corner: no two of them are level with each other.
+        low = (x, y, floor_z - 0.01 * wall)
+        covered = scene.material(choose(rng, (street_materials.grass, street_materials.pavement))(rng))
+        turn = Rotation.from_euler("Z", plan.yaw(wall))
+        scene.add(*anchored_group(f"outside {wall} ground", [("", ground, covered)], low, turn))
+        for k in range(integer(rng, 3, 5)):
             away = uniform(rng, 14.0, 40.0)
             block = CityBlock.sample(rng)
-            x, y = plan.at_wall(wall, middle + uniform(rng, -25.0, 25.0), -away - block.depth / 2)
+            along = 26.0 * (k // 2 + k % 2) * (1 if k % 2 else -1)
+            x, y = plan.at_wall(wall, middle + along + uniform(rng, -8.0, 8.0), -away - block.depth / 2)
             turn = Rotation.from_euler("Z", plan.yaw(wall) + uniform(rng, -0.2, 0.2))
             scene.add(
                 *anchored_group(f"outside {wall} {k}", [("block", block, material)], (x, y, floor_z), turn)

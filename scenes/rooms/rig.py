@@ -24,6 +24,10 @@ _WALL_MARGIN_M = 0.15
 """Between a camera and a wall."""
 _LARGE_M3 = 0.02
 """Things with a larger box than this limit the baseline; smaller ones that come too near are left out."""
+_NEAR_M = 1.2
+"""Depth up to which walls and furniture count as near."""
+_FREE_SHARE = 0.6
+"""Views of which less than this share is free of near things are chosen less often."""
 
 
 def sample_camera(rng: np.random.Generator, config: IndoorConfig, interior: Interior) -> StereoCamera:
@@ -39,12 +43,15 @@ def sample_camera(rng: np.random.Generator, config: IndoorConfig, interior: Inte
     carrier = choose(
         rng, ["person", "tripod", "robot"], [config.person_share, *((1 - config.person_share) / 2,) * 2]
     )
+    half_view = View(drawn, 1).half_view
     centres = np.array([(thing.extent.low + thing.extent.high) / 2 for thing in interior.placed])
     best: list[tuple[float, NDArray[np.float64], Rotation]] = []
     for _ in range(_CANDIDATES):
         place, turn = _candidate(rng, plan, carrier)
         if _stands_free(place, baseline_m, turn, interior, config.clearance_m):
-            best.append((_interest(place, turn, View(drawn, 1).half_view, centres, plan), place, turn))
+            free = 1.0 - near_share(place, turn, half_view, interior)
+            interest = _interest(place, turn, half_view, centres, plan)
+            best.append((interest * min(1.0, free / _FREE_SHARE) ** 2, place, turn))
     if not best:
         place, turn = _candidate(rng, plan, carrier)
         best.append((0.0, place, turn))
@@ -121,6 +128,24 @@ def _interest(
     ahead = -turn.as_matrix()[:, 2]
     wall = _to_shell(plan, place, ahead[None])[0]
     return float(np.sqrt(np.minimum(1.0, 2.0 / depth[seen])).sum()) * min(1.0, wall / 2.5)
+
+
+def near_share(
+    place: NDArray[np.float64], turn: Rotation, half_view: tuple[float, float], interior: Interior
+) -> float:
+    """Share of a view that walls, floor and furniture nearer than `_NEAR_M` take up."""
+    half_x, half_y = half_view
+    across, up = np.meshgrid(np.linspace(-half_x, half_x, 11), np.linspace(-half_y, half_y, 7))
+    rays = turn.apply(np.stack([across.ravel(), up.ravel(), -np.ones(across.size)], -1))
+    near = _to_shell(interior.plan, place, rays) < _NEAR_M
+    large = [t.extent for t in interior.placed if np.prod(t.extent.high - t.extent.low) > _LARGE_M3]
+    if large:
+        low, high = (np.array([getattr(extent, end) for extent in large]) - place for end in ("low", "high"))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            one, two = low / rays[:, None], high / rays[:, None]
+        enters, leaves = np.fmin(one, two).max(axis=2), np.fmax(one, two).min(axis=2)
+        near |= ((enters < leaves) & (leaves > 0) & (enters < _NEAR_M)).any(axis=1)
+    return float(near.mean())
 
 
 def _to_shell(plan: Plan, place: NDArray[np.float64], rays: NDArray[np.float64]) -> NDArray[np.float64]:

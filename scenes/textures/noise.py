@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 import numpy as np
@@ -23,7 +23,7 @@ from scenes.appearance.painting import (
     unit_grid,
 )
 from scenes.random_draws import choose, integer, log_uniform, new_seed, uniform
-from scenes.spec import Texture
+from scenes.spec import OMIT_DEFAULT, Texture
 
 
 @dataclass(frozen=True)
@@ -190,6 +190,8 @@ class WoodPlanks(Texture):
     rings: float
     """Year rings across a board."""
     grain: float
+    joint: float = field(default=0.6, metadata=OMIT_DEFAULT)
+    """Darkness of the joints between boards, 0..1."""
 
     @classmethod
     def sample(cls, rng: np.random.Generator, size: int) -> Self:
@@ -216,6 +218,6 @@ class WoodPlanks(Texture):
         value = fraction(ring) ** 2 + np.float32(0.12) * pores
         tone = 1 + np.float32(0.15) * rng.standard_normal(self.planks).astype(np.float32)[board]
         edge = np.minimum(fraction(across), 1 - fraction(across))
-        joint = 1 - np.float32(0.6) * (1 - smooth_step(edge, 0.012 * self.planks, 0.012 * self.planks))
+        joint = 1 - np.float32(self.joint) * (1 - smooth_step(edge, 0.012 * self.planks, 0.012 * self.planks))
         picture = colorize(value, self.palette) * (tone * joint)
         return finish(picture, rng, self.grain)

@@ -74,13 +74,13 @@ class WovenCloth(Texture):
         slubs = spectral_noise(rng, self.size, 0.5, 4, stretch=(1.0, 14.0))
         uneven = np.float32(0.05) * (slubs + spectral_noise(rng, self.size, 0.5, 4, stretch=(14.0, 1.0)))
         light = (1 - np.float32(self.relief) * self._gaps(x, y)) * (1 + uneven)
-        picture = paint(self.palette[0])
+        picture = paint(self.palette[0]) + np.zeros_like(x)
         if self.stripes:
-            picture = mix(picture + np.zeros_like(x), paint(self.palette[1]), self._bands(rng, x))
+            picture = mix(picture, paint(self.palette[1]), self._bands(rng, x))
         if self.wear > 0:
             patches = spectral_noise(rng, self.size, 1.2, 1) + np.float32(0.3) * slubs
             faded = np.float32(0.6) * smooth_step(patches, 1.4 - 2.4 * self.wear, 1.2)
-            picture = mix(picture + np.zeros_like(x), paint(self.palette[2]), faded)
+            picture = mix(picture, paint(self.palette[2]), faded)
         return finish(picture * light, rng, self.grain)
 
     def _gaps(self, x: Field, y: Field) -> Field:

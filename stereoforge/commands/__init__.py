@@ -20,6 +20,7 @@ COMMANDS = {
     "check": "Check",
     "rectify": "Rectify",
     "refine": "Refine",
+    "app": "App",
     "evaluate": "Evaluate",
     "study": "Study",
     "demo": "Demo",

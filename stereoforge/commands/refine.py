@@ -33,16 +33,6 @@ POSTERIOR_SAMPLES = 32
 """For --deviation: each pixel's deviation is off by an eighth of itself."""
 
 
-FEW_KNOWN = 0.1
-"""A disparity from another predictor that is known at a smaller share of the pixels is taken for a mistake."""
-LOW_CONFIDENCE = 0.15
-"""A mean confidence below this, too: the bundled weights give 0.4 on photographs, 0.1 on two that do not belong
-together."""
-BEYOND_INFINITY_PX = -0.5
-BEYOND_INFINITY = 0.01
-"""A share of disparities below that which is worth a remark."""
-
-
 @dataclass(frozen=True)
 class Refine:
     """Predict disparity, confidence and gradients of rectified pairs, and refine the disparity with the MRF.
@@ -170,6 +160,7 @@ class Refine:
         left, right, remarks = pair.read()
         remarks += (odd := pair_doubts(left, right))
         from stereoforge.inputs.disparity_files import read_disparity
+        from stereoforge.pipelines.doubts import disparity_doubts, result_doubts, view_doubts
         from stereoforge.pipelines.refined_files import write_refined
 
         size = (left.shape[0], left.shape[1])
@@ -191,13 +182,14 @@ class Refine:
             calibration, said = rig.calibration((size[1], size[0]))
             remarks += said
         remarks += write_refined(out, left, refined, calibration, self.min_confidence)
-        doubts = [] if odd else _doubtful_views(left, right)
-        doubts += _doubts(given[0], refined.confidence)
+        doubts = [] if odd else view_doubts(left, right)
+        if given[0] is not None:
+            doubts += disparity_doubts(given[0])
+        doubts += result_doubts(refined)
         disparity = refined.disparity
         return [
             *remarks,
             *doubts,
-            *_doubtful_result(disparity),
             f"{out}: disparity {disparity.min():.1f} to {disparity.max():.1f} px, refined in "
             f"{refined.info.seconds:.2f} s ({refined.info.solver}); look at {out / OVERVIEW}",
         ]
@@ -221,37 +213,3 @@ class Refine:
             keep_apart("--out", self.out / name, "--disparity-right", self.disparity_right)
             keep_apart("--out", self.out / name, "--calibration", self.calibration)
         check_writable("--out", self.out)
-
-
-def _doubts(given: NDArray[np.float32] | None, confidence: NDArray[np.float32]) -> list[str]:
-    """What looks like views that are swapped, or a disparity in another unit or of the other sign."""
-    doubts = []
-    if given is not None:
-        known = np.isfinite(given).mean()
-        if known < FEW_KNOWN:
-            doubts.append(
-                f"only {known:.1%} of the disparity is known: is it positive, in pixels of the left view?"
-            )
-        if (largest := np.nanquantile(given, 0.99)) < 1:
-            doubts.append(f"the disparity is hardly anywhere above {largest:.2g} px: is it in pixels?")
-    if confidence.mean() < LOW_CONFIDENCE:
-        doubts.append(
-            f"the confidence is low nearly everywhere (mean {confidence.mean():.2f}): are the views rectified, the "
-            "left one first, and the disparity in pixels?"
-        )
-    return doubts
-
-
-def _doubtful_views(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> list[str]:
-    from stereoforge_kit.matching import seem_swapped
-
-    if not seem_swapped(left, right):
-        return []
-    return ["more of the pair can be matched the other way round: is the first picture the left one?"]
-
-
-def _doubtful_result(disparity: NDArray[np.float32]) -> list[str]:
-    share = float((disparity < BEYOND_INFINITY_PX).mean())
-    if share < BEYOND_INFINITY:
-        return []
-    return [f"{share:.0%} of the refined disparities are negative, down to {disparity.min():.1f} px"]

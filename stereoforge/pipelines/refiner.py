@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -32,6 +33,7 @@ from stereoforge.pipelines.prediction import (
     open_settings,
     train_command,
 )
+from stereoforge_kit.errors import InputError
 from training.prediction.predictor import Prediction
 
 
@@ -149,7 +151,27 @@ class StereoRefiner:
             CommandError: views of different sizes, or a run folder without heads.
             TrainingError: arrays of another kind.
         """
-        prediction = self._predict(left, right, disparity, disparity_right)
+        prediction = self.predict(left, right, disparity=disparity, disparity_right=disparity_right)
+        return self.refine(left, prediction, deviation_samples=deviation_samples)
+
+    def refine(
+        self, left: Image, prediction: Prediction, *, strength: float = 1.0, deviation_samples: int = 0
+    ) -> RefinedPair:
+        """Refine what `predict` found, which is kept to refine it in several ways.
+
+        Args:
+            left: (H, W, 3) uint8 sRGB, the left view.
+            prediction: What `predict` found for it.
+            strength: Factor on the energy's gradient and colour terms, against how far the initial disparity is
+                trusted: 1 refines as validated, more follows the predicted slopes more closely.
+            deviation_samples: As in a call.
+
+        Raises:
+            CommandError: a run folder without heads.
+            InputError: a strength that is not positive.
+        """
+        if not 0 < strength < math.inf:
+            raise InputError(f"the strength of a refinement must be positive, got {strength}")
         confidence, gradient = prediction.confidence, prediction.gradient
         for name, found in zip(HEADS, (confidence, gradient), strict=True):
             if found is None:
@@ -159,13 +181,14 @@ class StereoRefiner:
         assert confidence is not None
         assert gradient is not None
         inputs = (prediction.disparity, confidence, gradient, left)
-        solution = self._method.solve(*inputs)
+        method = self._method if strength == 1 else _strengthened(self._method, strength)
+        solution = method.solve(*inputs)
         return RefinedPair(
             disparity=solution.disparity.astype(np.float32),
             initial=prediction.disparity,
             confidence=confidence,
             gradient=gradient,
-            deviation=self._method.sample(*inputs, deviation_samples) if deviation_samples else None,
+            deviation=method.sample(*inputs, deviation_samples) if deviation_samples else None,
             info=solution.info,
         )
 
@@ -174,9 +197,15 @@ class StereoRefiner:
         for left, right in pairs:
             yield self(left, right)
 
-    def _predict(
-        self, left: Image, right: Image, disparity: Map | None, disparity_right: Map | None
+    def predict(
+        self,
+        left: Image,
+        right: Image,
+        *,
+        disparity: Map | None = None,
+        disparity_right: Map | None = None,
     ) -> Prediction:
+        """Predict what `refine` takes. Arguments and errors as for a call."""
         if left.shape != right.shape:
             raise CommandError(
                 f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
@@ -187,3 +216,11 @@ class StereoRefiner:
         if self._matching is None:
             raise CommandError('a disparity of another predictor needs predictor="sgbm"')
         return self._matching.predict_for(left, right, disparity, disparity_right)
+
+
+def _strengthened(method: Ours, strength: float) -> Ours:
+    parameters = method.parameters
+    return replace(
+        method,
+        parameters=replace(parameters, alpha=parameters.alpha * strength, beta=parameters.beta * strength),
+    )

@@ -24,6 +24,9 @@ from stereoforge_kit.errors import InputError
 BoxCorners = tuple[float, float, float, float, float, float]
 """x, y, z of the lower corner and of the upper one."""
 
+_BEHIND_M = 2e-4
+"""How far faces that would coincide are apart."""
+
 
 @dataclass(frozen=True)
 class Top:
@@ -100,9 +103,24 @@ def surfaces(**parts: Part | Sequence[Part]) -> dict[str, Surface]:
 
 
 def slabs(*corners: BoxCorners) -> Part:
-    """Axis-aligned boxes."""
+    """Axis-aligned boxes; a face that would coincide with another box's, facing the same way, lies a little behind it.
+
+    Where two faces coincide, each shades the other, and Cycles renders them black.
+    """
     array = np.array(corners)
-    return boxes(array[:, :3], array[:, 3:])
+    low, high = array[:, :3].copy(), array[:, 3:].copy()
+    for box in range(1, len(array)):
+        for axis, ends, inwards in (
+            (k, ends, way) for k in range(3) for ends, way in ((low, 1.0), (high, -1.0))
+        ):
+            others = [k for k in range(3) if k != axis]
+            meets = (low[:box, others] < high[box, others] - 1e-6) & (
+                high[:box, others] > low[box, others] + 1e-6
+            )
+            taken = ends[:box, axis][meets.all(axis=1)]
+            while (np.abs(taken - ends[box, axis]) < 0.5 * _BEHIND_M).any():
+                ends[box, axis] += inwards * _BEHIND_M
+    return boxes(low, high)
 
 
 def lathe(

@@ -251,10 +251,12 @@ class Bed(IndoorShape):
     def parts(self) -> dict[str, Surface]:
         w, d = self.width / 2, self.length
         frame = [
-            *(slabs((x - 0.035, 0.0, 0.0, x + 0.035, 0.07, self.head)) for x in (-w, w)),
-            *(slabs((x - 0.035, d - 0.07, 0.0, x + 0.035, d, 0.42)) for x in (-w, w)),
-            slabs((-w, 0.0, 0.2, w, d, 0.33)),
-            slabs((-w, 0.01, self.head - 0.09, w, 0.06, self.head - 0.02)),
+            slabs(
+                *((x - 0.035, 0.0, 0.0, x + 0.035, 0.07, self.head) for x in (-w, w)),
+                *((x - 0.035, d - 0.07, 0.0, x + 0.035, d, 0.42) for x in (-w, w)),
+                (-w, 0.0, 0.2, w, d, 0.33),
+                (-w, 0.01, self.head - 0.09, w, 0.06, self.head - 0.02),
+            )
         ]
         if self.bars:
             frame += [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,7 +12,7 @@ import numpy as np
 from scenes.geometry.building import Part
 from scenes.random_draws import chance, choose, uniform
 from scenes.shapes.anchored import Surface
-from scenes.shapes.indoor.parts import IndoorShape, Top, lathe, legs, rod, slabs, surfaces
+from scenes.shapes.indoor.parts import BoxCorners, IndoorShape, Top, lathe, legs, rod, slabs, surfaces
 
 
 @dataclass(frozen=True)
@@ -71,11 +72,12 @@ class Table(IndoorShape):
             foot = 0.55 * w
             frame.append(lathe(((foot, 0.0), (foot * 0.9, 0.02), (0.04, 0.05), (0.04, under)), sides=24))
         elif self.stand == "sled":
+            low = 0.02 * math.cos(math.pi / 6)  # The rods are hexagons that lie on a flat side.
             for x in (-w + 0.12, w - 0.12):
                 path = (
                     (x, -d + 0.06, under),
-                    (x, -d + 0.06, 0.02),
-                    (x, d - 0.06, 0.02),
+                    (x, -d + 0.06, low),
+                    (x, d - 0.06, low),
                     (x, d - 0.06, under),
                 )
                 frame += [rod((one, two), 0.02, 6) for one, two in itertools.pairwise(path)]
@@ -135,15 +137,15 @@ class Desk(IndoorShape):
             for vertices, triangles in legs(w, d / 2, under, 0.045, inset=0.04)
         ]
         stand.append(slabs((-w + 0.05, 0.05, h - 0.35, w - 0.05, 0.065, under)))
-        fronts: list[Part] = []
+        fronts: list[BoxCorners] = []
         knobs: list[Part] = []
         if self.drawers:
             x0, x1, low = w - 0.48, w - 0.08, 0.08
-            fronts.append(slabs((x0, 0.08, low, x1, d - 0.04, under - 0.005)))
+            fronts.append((x0, 0.08, low, x1, d - 0.04, under - 0.005))
             step = (under - 0.005 - low) / self.drawers
             for k in range(self.drawers):
                 z = low + k * step
-                fronts.append(slabs((x0, d - 0.05, z + 0.004, x1, d - 0.02, z + step - 0.004)))
+                fronts.append((x0, d - 0.05, z + 0.004, x1, d - 0.02, z + step - 0.004))
                 knobs.append(
                     slabs((x0 + 0.12, d - 0.025, z + step - 0.06, x1 - 0.12, d - 0.005, z + step - 0.045))
                 )
@@ -151,7 +153,7 @@ class Desk(IndoorShape):
             **{
                 f"{self.board}_top": [slabs((-w, 0.0, under, w, d, h))],
                 self.framing: stand,
-                "lacquer_drawers": fronts,
+                "lacquer_drawers": [slabs(*fronts)] if fronts else [],
                 "chrome_handles": knobs,
             }
         )

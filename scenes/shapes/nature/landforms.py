@@ -17,6 +17,9 @@ from scenes.shapes.solids.basic import sample_proportions
 from scenes.shapes.solids.organic import wave_noise
 from scenes.spec import OMIT_DEFAULT, Shape, Vector
 
+_ROUNDING = 0.2
+"""Radius of the folds of `eroded_relief`'s waves, whose deviation is about 1."""
+
 
 def eroded_relief(
     rng: np.random.Generator, points: NDArray[np.float64], frequency: float, octaves: int, ridged: float
@@ -25,7 +28,8 @@ def eroded_relief(
 
     A sum of octaves of waves, each octave damped where those before it are steep, as water leaves it
     (I. Quilez's erosion by accumulated derivatives, after F. Musgrave's multifractals). `ridged` 0..1 folds
-    the octaves into crests.
+    the octaves into crests, rounded a little: the slope of a sharp fold jumps, and with it the damping, which would
+    leave vertical steps in the land.
     """
     height = np.zeros(len(points))
     gradient = np.zeros((len(points), 2))
@@ -36,9 +40,11 @@ def eroded_relief(
         phase = points @ directions.T + rng.uniform(0, 2 * np.pi, 8)
         wave = np.cos(phase).sum(axis=1) / 2.0
         slope = -np.sin(phase) @ directions / 2.0
-        crest = 1.0 - np.abs(wave)
+        folded = np.hypot(wave, _ROUNDING)
+        crest = 1.0 - folded
         octave = (1 - ridged) * wave + ridged * crest
-        gradient += amplitude * slope * ((1 - ridged) - ridged * np.sign(wave))[:, None] / frequency
+        fold = (1 - ridged) - ridged * wave / folded
+        gradient += amplitude * slope * fold[:, None] / frequency
         height += amplitude * octave / (1 + 0.5 * (gradient**2).sum(axis=1))
         amplitude *= 0.48
         number *= 2.03
@@ -67,6 +73,10 @@ class Basin:
             (x * cos + y * sin) / self.long, (y * cos - x * sin) / self.wide
         )
         return shares
+
+
+_SHORE = (3.2, 4.0)
+"""Rim shares up to which, and from which on no more, a pond keeps the land from being lower than the middle."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +126,12 @@ class Landscape(Shape):
         spread: NDArray[np.float64] = np.sign(line) * np.abs(line) ** self.concentration
         return spread
 
+    def cell(self, reach: float) -> float:
+        """Side of the grid's cells at a distance from the middle along x or y, both relative to half the side."""
+        line = self.line()
+        column = int(np.clip(np.searchsorted(line, reach), 1, self.cells))
+        return float(line[column] - line[column - 1])
+
     @lru_cache(maxsize=4)  # noqa: B019  (records are small, and the land is asked for its heights a lot)
     def heights(self) -> NDArray[np.float64]:
         """(cells + 1, cells + 1) heights at y (rows) and x (columns), 0 in the middle."""
@@ -129,6 +145,10 @@ class Landscape(Shape):
         rise = np.clip((reach - self.clearing) / (1.0 - self.clearing), 0.0, 1.0)
         rise = rise * rise * (3 - 2 * rise)
         uneven = self.roll * wave_noise(rng, points, 3.0 / max(self.clearing, 0.05), 1.2)
+        if self.basin is not None:
+            # No hollow about the pond is lower than the middle: its water would stand out of it.
+            shore = np.clip((self.basin.rim_shares(points) - _SHORE[0]) / (_SHORE[1] - _SHORE[0]), 0.0, 1.0)
+            uneven = np.where(uneven < uneven[-1], uneven[-1] + shore * (uneven - uneven[-1]), uneven)
         height = self.relief * rise * (0.25 + 0.75 * hills) + uneven
         if self.basin is not None:
             height -= self.basin.depth * np.clip(1.0 - self.basin.rim_shares(points) ** 2, 0.0, None) ** 0.7

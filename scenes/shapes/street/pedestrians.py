@@ -131,8 +131,8 @@ def _ball(middle: tuple[float, float, float], size: tuple[float, float, float]) 
 
 
 @dataclass(frozen=True)
-class PersonTop(MetricShape):
-    """Shirt, jacket or coat: torso, sleeves, a collar."""
+class _PersonPart(MetricShape):
+    """A part of a person; parts of one design fit together."""
 
     design: PersonDesign
 
@@ -141,6 +141,11 @@ class PersonTop(MetricShape):
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
         return cls(PersonDesign.sample(rng))
+
+
+@dataclass(frozen=True)
+class PersonTop(_PersonPart):
+    """Shirt, jacket or coat: torso, sleeves, a collar."""
 
     def surface(self) -> Surface:
         design = self.design
@@ -166,16 +171,8 @@ class PersonTop(MetricShape):
 
 
 @dataclass(frozen=True)
-class PersonLegs(MetricShape):
+class PersonLegs(_PersonPart):
     """Trousers or skirt."""
-
-    design: PersonDesign
-
-    smooth: ClassVar[bool] = True
-
-    @classmethod
-    def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(PersonDesign.sample(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -203,16 +200,8 @@ class PersonLegs(MetricShape):
 
 
 @dataclass(frozen=True)
-class PersonThings(MetricShape):
+class PersonThings(_PersonPart):
     """Shoes, hat and bag."""
-
-    design: PersonDesign
-
-    smooth: ClassVar[bool] = True
-
-    @classmethod
-    def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(PersonDesign.sample(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -253,16 +242,8 @@ class PersonThings(MetricShape):
 
 
 @dataclass(frozen=True)
-class PersonSkin(MetricShape):
+class PersonSkin(_PersonPart):
     """Head with nose, chin and ears, neck and hands."""
-
-    design: PersonDesign
-
-    smooth: ClassVar[bool] = True
-
-    @classmethod
-    def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(PersonDesign.sample(rng))
 
     def surface(self) -> Surface:
         design = self.design
@@ -278,16 +259,8 @@ class PersonSkin(MetricShape):
 
 
 @dataclass(frozen=True)
-class PersonFeatures(MetricShape):
+class PersonFeatures(_PersonPart):
     """Eyes, brows and mouth."""
-
-    design: PersonDesign
-
-    smooth: ClassVar[bool] = True
-
-    @classmethod
-    def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(PersonDesign.sample(rng))
 
     def surface(self) -> Surface:
         parts = [_ball((0.103, 0.0, 1.578), (0.009, 0.026, 0.007))]
@@ -298,16 +271,8 @@ class PersonFeatures(MetricShape):
 
 
 @dataclass(frozen=True)
-class PersonHair(MetricShape):
+class PersonHair(_PersonPart):
     """Hair over the head, of one of several cuts."""
-
-    design: PersonDesign
-
-    smooth: ClassVar[bool] = True
-
-    @classmethod
-    def sample(cls, rng: np.random.Generator) -> Self:
-        return cls(PersonDesign.sample(rng))
 
     def surface(self) -> Surface:
         cut = self.design.hair

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from datagen.rendering.exposure import GLARE, KNEE, automatic_exposure, develop
+from datagen.rendering.exposure import CUT_OFF, GLARE, KNEE, automatic_exposure, develop
 
 
 def grey(level: float) -> np.ndarray:
@@ -43,6 +43,19 @@ def test_black_is_lifted_and_colours_fade_towards_white() -> None:
 def test_exposure_is_limited_by_the_highlights() -> None:
     dark = np.full((20, 20, 3), 0.02, np.float32)
     assert automatic_exposure(dark, 0.18) == pytest.approx(9.0)
-    lamp = dark.copy()
-    lamp[:2] = 5.0  # A tenth of the picture.
-    assert automatic_exposure(lamp, 0.18) == pytest.approx(1.1 / 5.0)
+    window = np.full((20, 20, 3), 0.2, np.float32)
+    window[:2] = 1.5  # A tenth of the picture.
+    assert automatic_exposure(window, 0.18) == pytest.approx(1.1 / 1.5)
+
+
+def test_a_lamp_darkens_a_room_by_one_stop_at_most_and_is_not_cut_off() -> None:
+    room = np.full((20, 20, 3), 0.02, np.float32)
+    room[:2] = (0.5, 0.4, 0.3)
+    log_average = np.exp(0.9 * np.log(0.02) + 0.1 * np.log(room[0, 0] @ (0.2126, 0.7152, 0.0722)))
+    assert automatic_exposure(room, 0.18) == pytest.approx(0.18 / log_average / 2, rel=1e-5)
+    room[:2] = (8.0, 5.0, 3.0)
+    exposure = automatic_exposure(room, 0.18)
+    assert exposure == pytest.approx(CUT_OFF / 8.0)
+    picture = develop(room, exposure)
+    assert picture.max() < 255
+    assert (develop(room, 1.03 * exposure)[:2, :, 0] == 255).all()

@@ -6,13 +6,19 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from datagen.ground_truth.scene_geometry import SceneGeometry, build_geometry
 from scenes import FAMILIES, sample_scene
+from scenes.appearance.material_textures import fur
 from scenes.landscapes.framing import FRAMINGS
-from scenes.landscapes.terrain import LandscapeConfig
-from scenes.shapes.nature.landforms import Landscape
-from scenes.spec import Scene
+from scenes.landscapes.terrain import Land, LandscapeConfig
+from scenes.landscapes.water import water_size_m, with_pond
+from scenes.motion.trajectories import quaternion
+from scenes.placement.ground import GroundPlacement
+from scenes.random_draws import uniform
+from scenes.shapes.nature.landforms import Landscape, eroded_relief
+from scenes.spec import Scene, StereoCamera, Trajectory
 from tests.scenes.families.landscapes import first_hits, ground_below, world_vertices
 
 FAMILY_NAMES = ("monkaa", "sintel")
@@ -115,6 +121,37 @@ def test_ponds_lie_in_basins_and_nothing_but_stones_stands_in_them(family: str) 
     assert found >= 2
 
 
+def test_the_edge_of_a_ponds_water_is_under_the_shore() -> None:
+    ponds = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        shape = Landscape(
+            0.15, uniform(rng, 0.0001, 0.0006), 0.2, uniform(rng, 3.0, 9.0), 7, 0.5, 120, 2.4, seed
+        )
+        land = with_pond(rng, Land(shape, uniform(rng, 30.0, 60.0)), 1.0, 1.0)
+        basin = land.shape.basin
+        if basin is None:
+            continue
+        ponds += 1
+        long_m, wide_m = water_size_m(land)
+        along, ends = np.linspace(-1.0, 1.0, 101), np.repeat([-1.0, 1.0], 101)
+        rim = np.concatenate(
+            [np.stack([np.tile(along, 2), ends], -1), np.stack([ends, np.tile(along, 2)], -1)]
+        )
+        cos, sin = np.cos(basin.heading_rad), np.sin(basin.heading_rad)
+        turned = rim * (long_m, wide_m) @ np.array([[cos, sin], [-sin, cos]])
+        assert (land.height_m(turned + np.array((basin.x, basin.y)) * land.half_m) > land.water_m).all(), seed
+    assert ponds > 6
+
+
+def test_eroded_land_has_no_steps() -> None:
+    """Along a line, heights hardly differ between points that are very near to each other."""
+    line = np.stack([np.linspace(-1.0, 1.0, 40_001), np.full(40_001, 0.3)], -1)
+    for seed in range(8):
+        heights = eroded_relief(np.random.default_rng(seed), line, 3.6, 3, 0.7)
+        assert np.abs(np.diff(heights)).max() < 0.01 * np.ptp(heights), seed
+
+
 @pytest.mark.parametrize("family", FAMILY_NAMES)
 def test_shares_of_materials_are_fields(family: str) -> None:
     def reflective(share: float) -> float:
@@ -175,3 +212,16 @@ def test_nothing_stands_in_the_middle_of_a_character(family: str) -> None:
                     ("ground", "water", "cave", "bush", "tree", "ruin", "house")
                 ):
                     assert not ((heart > other_low) & (heart < other_high)).all(), (seed, body, other)
+
+
+def test_a_texture_may_have_a_largest_size() -> None:
+    land = Land(Landscape(0.15, 0.0003, 0.2, 6.0, 3, 0.5, 20, 2.4, 0), 40.0)
+    level = quaternion(Rotation.from_euler("X", 90.0, degrees=True))
+    camera = StereoCamera(96, 54, 35.0, 0.1, Trajectory.static((0.0, 0.0, 1.6), level))
+    placement = GroundPlacement(land, camera, 1, 1.0)
+    free, bound = (
+        placement.new_material(np.random.default_rng(0), fur, 3.0, 20.0, size=512, largest_m=most)
+        for most in (np.inf, 6.0)
+    )
+    assert placement.materials[free].repeats < 0.5
+    assert placement.materials[bound].repeats == pytest.approx(0.5)

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from scenes.appearance.materials import Shares
-from scenes.appearance.room_materials import RoomMaterials
+from scenes.appearance.room_materials import RoomMaterials, wood
+from scenes.placement.view import View
 from scenes.rooms.clutter import add_things
 from scenes.rooms.config import ROOM_KINDS, IndoorConfig
 from scenes.rooms.furnishing import furnish
 from scenes.rooms.interior import Interior, Placed
+from scenes.rooms.lighting import add_outside
 from scenes.rooms.plan import Plan, sample_plan
+from scenes.rooms.rig import near_share, sample_camera
 from scenes.rooms.shell import build_shell
 from scenes.shapes.indoor.shell import RoomWall
+from scenes.shapes.indoor.storage import Shelf
 from scenes.shapes.indoor.tables import Desk, Table
 from scenes.spec import SceneObject
+from scenes.textures.noise import WoodPlanks
 
 CONFIG = IndoorConfig(things=(20, 60))
 
@@ -135,3 +142,60 @@ def test_rooms_have_what_their_kind_has(interiors: list[Interior]) -> None:
     for kind, name in expected.items():
         rooms = [i for i in interiors if i.plan.kind == kind]
         assert any(group[0].name.startswith(name) for i in rooms for group in i.assembly.groups), kind
+
+
+def test_the_share_of_a_view_that_near_things_take_up() -> None:
+    """A camera in an empty hall sees nothing near; before a board that covers half of its view, it sees that half."""
+    interior = Interior(Plan("office", 10.0, 10.0, 6.0, ()), RoomMaterials(Shares(0.8, 0.2, 0.5, 0.7)))
+    place, towards_y = np.array((5.0, 2.0, 3.0)), Rotation.from_euler("X", 90.0, degrees=True)
+    assert near_share(place, towards_y, (0.8, 0.5), interior) == 0.0
+    shelf = Shelf(width=4.0, depth=0.3, height=6.0, levels=4, bays=2, board="lacquer", backed=True)
+    interior.put(np.random.default_rng(0), "shelf", shelf, (7.0, 2.8, 0.0))
+    assert near_share(place, towards_y, (0.8, 0.5), interior) == pytest.approx(0.5, abs=0.06)
+    assert near_share(place, Rotation.from_euler("X", -90.0, degrees=True), (0.8, 0.5), interior) == 0.0
+
+
+def filled_views(rooms: int) -> int:
+    """How many cameras, one in each of some rooms with tall shelves, have half of their view filled by what is near."""
+    filled = 0
+    for seed in range(rooms):
+        rng = np.random.default_rng(seed)
+        interior = Interior(Plan("office", 4.5, 4.5, 2.5, ()), RoomMaterials(Shares(0.8, 0.2, 0.5, 0.7)))
+        for _ in range(5):
+            interior.try_on_floor(rng, "shelf", Shelf(1.4, 0.3, 2.2, 4, 1, "lacquer", True))
+        camera = sample_camera(rng, CONFIG, interior)
+        pose = camera.pose("left", 0.0)
+        turn = Rotation.from_matrix(pose[:3, :3])
+        filled += near_share(pose[:3, 3], turn, View(camera, 1).half_view, interior) > 0.5
+    return filled
+
+
+def test_few_cameras_stand_before_something_that_fills_their_view() -> None:
+    assert filled_views(16) <= 1
+
+
+def test_there_is_ground_outside_of_every_wall_with_windows() -> None:
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        interior = Interior(sample_plan(rng, CONFIG, "office"), RoomMaterials(Shares(0.8, 0.2, 0.5, 0.7)))
+        before = len(interior.assembly.groups)
+        add_outside(np.random.default_rng(seed), interior)
+        outside = interior.assembly.groups[before:]
+        grounds = [corners(group[0]) for group in outside if group[0].name.endswith("ground")]
+        walls = {opening.wall for opening in interior.plan.openings if not opening.door}
+        assert len(grounds) == len(walls)
+        tops = [float(ground[:, 2].max()) for ground in grounds]
+        assert len({round(top, 3) for top in tops}) == len(tops)
+        assert all(top <= -0.2 + 1e-6 for top in tops)
+        room = np.array((interior.plan.width, interior.plan.depth))
+        for ground in grounds:
+            low, high = ground[:, :2].min(axis=0), ground[:, :2].max(axis=0)
+            assert ((high < 0) | (low > room)).any()
+
+
+def test_joints_between_the_boards_of_furniture_hardly_show() -> None:
+    for seed in range(6):
+        texture = wood(np.random.default_rng(seed), Shares(0.5, 0.2, 0.5, 0.5)).color
+        assert isinstance(texture, WoodPlanks)
+        seamless = replace(texture, joint=0.0).image().astype(float)
+        assert (texture.image() > 0.85 * seamless - 2.0).all()

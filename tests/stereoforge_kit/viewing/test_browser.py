@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import html
-import json
-import re
-import shutil
-import subprocess
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +10,8 @@ import pytest
 
 from stereoforge_kit.viewing.html import environment
 from stereoforge_kit.viewing.plots import curves, hoverable
+from tests.browser import CHROMIUM, run_browser
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PHONE_PX = 400
 
 PAGE = """
@@ -90,21 +85,8 @@ def facts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     folder = tmp_path_factory.mktemp("browser")
     frame = f'<iframe width="{PHONE_PX}" height="900" style="border:0" srcdoc="{html.escape(page)}"></iframe>'
     (folder / "probe.html").write_text(f"<!doctype html><body>{frame}{probe}</body>")
-    return run_browser(folder)
-
-
-def run_browser(folder: Path) -> dict[str, Any]:
-    command = [
-        str(CHROMIUM),
-        *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
-        *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-        f"--user-data-dir={folder / 'profile'}",
-        *("--window-size=800,1000", "--dump-dom", (folder / "probe.html").as_uri()),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    found = re.search(r"FACTS(.*)END", done.stdout, re.DOTALL)
-    assert found, done.stderr[-500:]
-    return json.loads(html.unescape(found[1]))
+    address = (folder / "probe.html").as_uri()
+    return run_browser(address, folder / "profile", "--window-size=800,1000")
 
 
 def test_a_press_on_a_heading_sorts_by_value_and_nothing_comes_last(facts: dict[str, Any]) -> None:

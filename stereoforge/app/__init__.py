@@ -1,0 +1,1 @@
+"""The page to try it: `results` finds what it shows and knows no Gradio, `page` lays it out, `server` serves it."""
