@@ -41,7 +41,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, DemoResult]:
     """The demo with next to no scenes and steps: every stage is the real one."""
     plan = DemoPlan(
         scenes={"train": 2, "val": 1, "test": 1},
-        steps={"regressor": 3, "confnet": 2, "gradnet": 2},
+        steps={"regressor": 3, "confnet": 2, "gradnet": 2, "regressor_f": 2},
     )
     small = DemoPlan(type(plan.world)(width=384, height=192), plan.scenes, plan.steps, gallery_scenes=2)
     out = tmp_path_factory.mktemp("demo") / "demo"
@@ -279,7 +279,7 @@ def test_the_demo_continues_what_is_there(demo: tuple[Path, DemoResult]) -> None
     plan = DemoPlan(
         type(DemoPlan().world)(width=384, height=192),
         {"train": 2, "val": 1, "test": 1},
-        {"regressor": 3, "confnet": 2, "gradnet": 2},
+        {"regressor": 3, "confnet": 2, "gradnet": 2, "regressor_f": 2},
         gallery_scenes=2,
     )
     run_demo(out, plan)
