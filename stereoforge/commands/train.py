@@ -62,7 +62,7 @@ class Train:
     """Data sets that decide which weights are kept."""
     crop: Annotated[str | None, shown("WxH", "the preset's")] = None
     """Size of the training crops, multiples of 64 (for costvolume, of 32); KITTI's frames need 320 rows or fewer."""
-    batch_size: Annotated[int | None, shown("N", "the preset's, 4")] = None
+    batch_size: Annotated[int | None, shown("N", "the preset's")] = None
     """Crops in an optimizer step."""
     learning_rate: Annotated[float | None, shown("RATE", "the preset's")] = None
     """The largest learning rate, after the warm-up."""
