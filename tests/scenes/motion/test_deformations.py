@@ -93,7 +93,8 @@ def test_characters_move_smoothly_and_not_far(seed: int) -> None:
         reach = max(reach, float(np.abs(moved - rest).max()))
         # Half the time step, half the way: there is a velocity, and it is bounded.
         whole, half = _step(motion, rest, time, 0.02), _step(motion, rest, time, 0.01)
-        assert np.abs(whole - 2 * half).max() < 0.02 * np.abs(whole).max() + 1e-9
+        # At its slowest a body moves by micrometres, which its acceleration is not small against.
+        assert np.abs(whole - 2 * half).max() < 0.02 * np.abs(whole).max() + 1e-6
         assert np.abs(whole).max() / 0.02 < 0.5
     assert 0.005 < reach < 1.5
 

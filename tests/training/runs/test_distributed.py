@@ -49,6 +49,7 @@ def test_two_processes_make_the_run_of_one_with_double_batch(
         safetensors.torch.load_file(tmp_path / name / "regressor.safetensors") for name in ("one", "two")
     ]
     for name, tensor in weights[0].items():
-        torch.testing.assert_close(weights[1][name], tensor, rtol=1e-4, atol=1e-5)
+        # Adam divides by the root of squared gradients, so where these are near 0 rounding moves a weight by more.
+        torch.testing.assert_close(weights[1][name], tensor, rtol=1e-4, atol=5e-5)
     figures = [read_summary(tmp_path / name, "regressor").validation for name in ("one", "two")]
     assert figures[0] == pytest.approx(figures[1], rel=1e-4)

@@ -20,7 +20,7 @@ def quick(**changes: object) -> RegressorPreset:
     preset = find_preset("regressor", "tiny", "costvolume")
     assert isinstance(preset, RegressorPreset)
     network = replace(
-        preset.network, **{"stem": 4, "encoder": (8, 8, 8), "aggregation": (4, 4, 4), "look_channels": 8}
+        preset.network, **{"stem": 4, "encoder": (8,) * 4, "aggregation": (4,) * 4, "look_channels": 8, "full_channels": 4}
     )
     small = {"crop_width": 64, "crop_height": 32, "validation_interval": 4, "network": network}
     return replace(preset, **(small | changes))  # type: ignore[arg-type]
