@@ -68,7 +68,7 @@ class Train:
     """The largest learning rate, after the warm-up."""
     freeze: Annotated[str | None, shown("PARTS", "none")] = None
     """regressor with --init, regressor_f: parts of the network that stay as they are, comma-separated; of costvolume
-    these are descriptors, aggregation, half_weights and look."""
+    these are descriptors, aggregation, half_weights, look and full_look."""
     correct_within: Annotated[float | None, shown("PX", "the preset's, 1")] = None
     """confnet: a disparity this close to the ground truth counts as correct (KITTI: 3)."""
     ema: Annotated[float | None, shown("DECAY", "none")] = None

@@ -20,7 +20,8 @@ def quick(**changes: object) -> RegressorPreset:
     preset = find_preset("regressor", "tiny", "costvolume")
     assert isinstance(preset, RegressorPreset)
     network = replace(
-        preset.network, **{"stem": 4, "encoder": (8,) * 4, "aggregation": (4,) * 4, "look_channels": 8, "full_channels": 4}
+        preset.network,
+        **{"stem": 4, "encoder": (8,) * 4, "aggregation": (4,) * 4, "look_channels": 8, "full_channels": 4},
     )
     small = {"crop_width": 64, "crop_height": 32, "validation_interval": 4, "network": network}
     return replace(preset, **(small | changes))  # type: ignore[arg-type]
@@ -52,14 +53,14 @@ def test_frozen_parts_stay_as_they_were(
     train_quietly("regressor", [(data, 1.0)], tmp_path, preset, steps=4, init=start)
     before, after = weights(start), weights(tmp_path)
     changed = {name.split(".")[0] for name in before if not torch.equal(before[name], after[name])}
-    assert changed == {"look", "half_weights"}
+    assert changed == {"look", "full_look", "half_weights"}
 
 
 def test_parts_to_freeze_must_exist_and_leave_something(data: Path, start: Path, tmp_path: Path) -> None:
     source = [(data, 1.0)]
     with pytest.raises(TrainingError, match="has no part 'head' to freeze; it has descriptors, aggregation"):
         train_quietly("regressor", source, tmp_path / "a", quick(frozen=("head",)), init=start)
-    everything = ("descriptors", "aggregation", "half_weights", "look")
+    everything = ("descriptors", "aggregation", "half_weights", "look", "full_look")
     with pytest.raises(TrainingError, match="nothing to train"):
         train_quietly("regressor", source, tmp_path / "b", quick(frozen=everything), init=start)
     with pytest.raises(TrainingError, match="frozen parts keep the weights of another run"):

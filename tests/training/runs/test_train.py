@@ -45,7 +45,13 @@ def quick(task: str, network: str = "dispnet", **changes: object) -> Preset:
 
 NARROW: dict[str, dict[str, object]] = {
     "dispnet": {"width": 0.0625},
-    "costvolume": {"stem": 4, "encoder": (8,) * 4, "aggregation": (4,) * 4, "look_channels": 8, "full_channels": 4},
+    "costvolume": {
+        "stem": 4,
+        "encoder": (8,) * 4,
+        "aggregation": (4,) * 4,
+        "look_channels": 8,
+        "full_channels": 4,
+    },
 }
 
 
