@@ -68,15 +68,18 @@ def ground_below(geometry: SceneGeometry, points: NDArray[np.float64]) -> NDArra
 
 
 def heights_of_feet(geometry: SceneGeometry, indices: list[int], time_frames: float) -> NDArray[np.float64]:
-    """(N,) how far the lowest vertex of each object is above the ground, relative to the object's size."""
-    lowest, sizes = [], []
+    """(N,) how far each object is above the ground, relative to its size: the least of its lowest tenth.
+
+    Not that of its lowest vertex, which on a slope may be the end of a bough that hangs over lower ground.
+    """
+    heights = []
     for index in indices:
         vertices = world_vertices(geometry, index, time_frames)
-        lowest.append(vertices[vertices[:, 2].argmin()])
-        sizes.append(float(np.ptp(vertices, axis=0).max()))
-    feet = np.array(lowest)
-    heights: NDArray[np.float64] = (feet[:, 2] - ground_below(geometry, feet)) / np.array(sizes)
-    return heights
+        low, high = vertices[:, 2].min(), vertices[:, 2].max()
+        lowest = vertices[vertices[:, 2] <= low + 0.1 * (high - low)]
+        above = lowest[:, 2] - ground_below(geometry, lowest)
+        heights.append(above.min() / np.ptp(vertices, axis=0).max())
+    return np.array(heights)
 
 
 def encloses(geometry: SceneGeometry, index: int, point: NDArray[np.float64], time_frames: float) -> float:

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from datagen.ground_truth.scene_geometry import build_geometry
@@ -62,6 +62,7 @@ def test_neither_camera_is_ever_inside_or_near_anything(seed: int) -> None:
 
 @settings(max_examples=4, deadline=None)
 @given(seed=seeds)
+@example(seed=450)  # a tree on a hill, whose boughs hang lower than its foot
 def test_what_stands_stands_on_the_ground_throughout(seed: int) -> None:
     scene = sampled(seed, FEW)
     geometry = build_geometry(scene)
