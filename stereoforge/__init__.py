@@ -7,20 +7,6 @@ Examples:
     pair = refiner(left, right)  # (H, W, 3) uint8 each
 """
 
-from __future__ import annotations
+import lazy_loader
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from stereoforge.pipelines.refiner import RefinedPair, StereoRefiner
-
-__all__ = ["RefinedPair", "StereoRefiner"]
-
-
-def __getattr__(name: str) -> Any:
-    """Import what is asked for: the networks take seconds, and `stereoforge --help` needs none of them."""
-    if name in __all__:
-        import stereoforge.pipelines.refiner
-
-        return getattr(stereoforge.pipelines.refiner, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from stereoforge.pipelines.refiner import StereoRefiner
 
 HIGHEST_PORT = 65535
-WARM_UP_SIZE = (120, 160, 3)
-"""Smaller pictures are solved without the compiled kernels."""
 
 
 @dataclass(frozen=True)
@@ -78,5 +76,7 @@ class App:
 
 def _warm_up(refiner: StereoRefiner) -> None:
     """Refine noise, so that the kernels are compiled before the first visitor's pair."""
-    noise = np.random.default_rng(0).integers(0, 256, WARM_UP_SIZE, dtype=np.uint8)
+    from stereoforge.pipelines.warming import PAIR_SIZE
+
+    noise = np.random.default_rng(0).integers(0, 256, (*PAIR_SIZE, 3), dtype=np.uint8)
     refiner(noise, np.roll(noise, -4, axis=1))

@@ -9,8 +9,8 @@ from multiprocessing import get_context
 
 import numpy as np
 
-_HEIGHT, _WIDTH = 120, 160
-"""Of the pair that is refined; smaller ones are solved directly, without the compiled kernels."""
+PAIR_SIZE = 120, 160
+"""Height and width of a pair that is refined to compile; smaller ones are solved directly, without the kernels."""
 
 
 def refine_a_pair() -> None:
@@ -20,7 +20,7 @@ def refine_a_pair() -> None:
     from refine.mrf.solve import solve_mrf
 
     rng = np.random.default_rng(0)
-    disparity = rng.uniform(0, 20, (_HEIGHT, _WIDTH)).astype(np.float32)
+    disparity = rng.uniform(0, 20, PAIR_SIZE).astype(np.float32)
     confidence = rng.uniform(0, 1, disparity.shape).astype(np.float32)
     gradient = np.zeros((*disparity.shape, 2), np.float32)
     image = rng.integers(0, 255, (*disparity.shape, 3), np.uint8)

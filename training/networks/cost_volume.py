@@ -89,6 +89,26 @@ def windowed_cosines(left: Tensor, right: Tensor, disparity: Tensor, reach: int)
     return torch.stack([at * (1 - weight) + after * weight for at, after in pairs], dim=2).flatten(1, 2)
 
 
+def expected_shift(decision: Tensor, reach: int) -> Tensor:
+    """The shift that is decided on after `windowed_cosines`: the expectation over its offsets, plus a free shift.
+
+    Args:
+        decision: (B, 2 reach + 2, H, W): logits of the offsets -reach .. reach, and the free shift.
+        reach: Largest offset in pixels.
+
+    Returns:
+        (B, 1, H, W) px.
+
+    Examples:
+        >>> decision = torch.tensor([-20.0, -20.0, 20.0, 0.25]).view(1, 4, 1, 1)
+        >>> expected_shift(decision, reach=1).item()
+        1.25
+    """
+    offsets = torch.arange(-reach, reach + 1, device=decision.device, dtype=decision.dtype)
+    expectation = (decision[:, :-1].softmax(1) * offsets[:, None, None]).sum(1, keepdim=True)
+    return expectation + decision[:, -1:]
+
+
 class Readout(NamedTuple):
     """What a volume of scores says of each pixel."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import nn
 
-CONVOLUTIONS = (nn.Conv2d, nn.Conv3d, nn.ConvTranspose2d)
+_CONVOLUTIONS = (nn.Conv2d, nn.Conv3d, nn.ConvTranspose2d)
 
 
 def initialize(network: nn.Module, slope: float = 0.0) -> None:
@@ -22,7 +22,7 @@ def initialize(network: nn.Module, slope: float = 0.0) -> None:
         (2.0, 0.0)
     """
     for layer in network.modules():
-        if isinstance(layer, CONVOLUTIONS) and not layer.weight.is_meta:
+        if isinstance(layer, _CONVOLUTIONS) and not layer.weight.is_meta:
             nn.init.kaiming_normal_(layer.weight, a=slope)
             if layer.bias is not None:
                 nn.init.zeros_(layer.bias)

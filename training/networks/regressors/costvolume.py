@@ -23,6 +23,7 @@ from training.networks.cost_volume import (
     NEIGHBOURS,
     convex_upsample,
     cosine_volume,
+    expected_shift,
     normalized_groups,
     read_out,
     windowed_cosines,
@@ -359,21 +360,6 @@ class LookOutput(NamedTuple):
     """(B, F, h, w): its last features."""
 
 
-def expected_shift(decision: Tensor, reach: int) -> Tensor:
-    """The shift that a look decides on: the expectation over its offsets, plus a free shift.
-
-    Args:
-        decision: (B, 2 reach + 2, h, w): logits of the offsets -reach .. reach, and the free shift.
-        reach: Largest offset in pixels.
-
-    Returns:
-        (B, 1, h, w) px.
-    """
-    offsets = torch.arange(-reach, reach + 1, device=decision.device, dtype=decision.dtype)
-    expectation = (decision[:, :-1].softmax(1) * offsets[:, None, None]).sum(1, keepdim=True)
-    return expectation + decision[:, -1:]
-
-
 class SecondLook(nn.Module):
     """Compares the views at 1/2 around the volume's disparity, where half a pixel can be seen."""
 
@@ -472,11 +458,11 @@ class ThirdLook(nn.Module):
             disparity: (B, 1, H, W) px after the second look.
         """
         features = self.join(self.stem(images) + _doubled(self.narrow(context)))
-        described = self.describe(features)
-        left, right = (normalized_groups(view, 1) for view in described.chunk(2))
+        described = self.describe(features).chunk(2)
+        left, right = (normalized_groups(view, 1) for view in described)
         products = windowed_cosines(left, right, disparity, self.reach)
         scaled = disparity / 64  # of the size of the other inputs
-        inputs = [products, described.chunk(2)[0], features.chunk(2)[0], scaled]
+        inputs = [products, described[0], features.chunk(2)[0], scaled]
         decision = self.decide(self.layers(torch.cat(inputs, dim=1))).float()
         return expected_shift(decision, self.reach)
 

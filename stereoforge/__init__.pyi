@@ -1,0 +1,3 @@
+from .pipelines.refiner import RefinedPair, StereoRefiner
+
+__all__ = ["RefinedPair", "StereoRefiner"]
