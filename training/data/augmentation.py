@@ -1,7 +1,8 @@
 """Random changes to a stereo pair that keep it a rectified pair with exact disparity.
 
 Geometry (one crop window, zoom and squeeze for both views) and colour follow the augmentation layers of the released
-DispNet training definition. Images are interpolated bilinearly. Disparity and gradients take the nearest pixel's value.
+DispNet training definition. Images are interpolated bilinearly, and so is disparity within a surface; at edges, as for
+gradients, the nearest pixel's value is taken.
 
 What tells two real cameras apart can be added (`training.data.view_differences`). Disparity stays that of the ideal
 rig.
@@ -119,6 +120,8 @@ SHEARED = 0.25
 """Share of the pairs that `AugmentationConfig.shear` applies to."""
 BLURRED = 0.25
 """Share of the pairs that `AugmentationConfig.one_sided_blur` applies to."""
+SAME_SURFACE_PX = 1.0
+"""Neighbouring pixels whose disparities differ by no more are taken to see one surface."""
 WINDOW_TRIALS = 50
 """Windows drawn before the centre crop is taken."""
 RIGHT_ONLY_GROWTH_STEPS = 50_000
@@ -322,8 +325,8 @@ def cut(
     nearest_rows = _nearest(rows, pair.left.shape[0])
     nearest_columns = _nearest(columns, pair.left.shape[1])
     gradient = missing_at_borders(forward_differences(pair.disparity_left))
-    nearest = np.ix_(nearest_rows, nearest_columns)
-    disparity, gradient = pair.disparity_left[nearest], gradient[nearest]
+    gradient = gradient[np.ix_(nearest_rows, nearest_columns)]
+    disparity = sample_disparity(pair.disparity_left, rows, columns)
     moves = shear * (rows - (rows[0] if shear > 0 else rows[-1]))
     gradient = gradient + np.array([0.0, shear], np.float32)
     columns_right = columns if shear == 0 else columns + moves[:, None]
@@ -334,6 +337,38 @@ def cut(
         disparity=(disparity + moves[:, None].astype(np.float32)) * np.float32(window.zoom_x),
         gradient=gradient * np.array([1.0, window.zoom_x / window.zoom_y], np.float32),
     )
+
+
+def sample_disparity(disparity: Float32, rows: NDArray[np.float64], columns: NDArray[np.float64]) -> Float32:
+    """Interpolate a disparity bilinearly within surfaces; where the four pixels around a point belong to several, or
+    one of them has none, take the nearest pixel's.
+
+    Args:
+        disparity: (h, w) px, NaN where there is none.
+        rows: (H,) positions in pixels; pixel centres lie at + 0.5.
+        columns: (W,) positions.
+
+    Returns:
+        (H, W) px.
+
+    Examples:
+        >>> slope = np.array([[1.0, 1.5, 9.0]], np.float32)
+        >>> sample_disparity(slope, np.array([0.5]), np.array([0.75, 1.75, 2.25])).tolist()
+        [[1.125, 1.5, 9.0]]
+    """
+    row, row_weight = _neighbours(rows, disparity.shape[0])
+    column, column_weight = _neighbours(columns, disparity.shape[1])
+    below = np.minimum(row + 1, disparity.shape[0] - 1)
+    right = np.minimum(column + 1, disparity.shape[1] - 1)
+    corners = [
+        disparity[np.ix_(at_row, at_column)] for at_row in (row, below) for at_column in (column, right)
+    ]
+    above, under = (first + (second - first) * column_weight for first, second in (corners[:2], corners[2:]))
+    interpolated = above + (under - above) * row_weight[:, None]
+    nearest = disparity[np.ix_(_nearest(rows, disparity.shape[0]), _nearest(columns, disparity.shape[1]))]
+    spread = np.max(corners, axis=0) - np.min(corners, axis=0)
+    values: Float32 = np.where(spread <= SAME_SURFACE_PX, interpolated, nearest)
+    return values
 
 
 def missing_at_borders(gradient: Float32) -> Float32:

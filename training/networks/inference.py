@@ -39,12 +39,14 @@ class Estimate(NamedTuple):
     """(B, 2, H, W) px per pixel, [dx, dy]."""
 
 
-def regress(regressor: Regressor, left: Tensor, right: Tensor) -> Regression:
+def regress(regressor: Regressor, left: Tensor, right: Tensor, stretch: float = 1.0) -> Regression:
     """Predict the left view's disparity.
 
     Args:
         regressor: The network.
         left, right: (B, 3, H, W) in 0..1, H and W multiples of the network's stride.
+        stretch: How many times wider than the pictures these are (`Fitting.stretch`). Disparities are in pixels of
+            `left`; how far the network looks is in those of the pictures.
 
     Examples:
         >>> from training.networks import DispNetConfig, DispNetCorr1D
@@ -52,17 +54,20 @@ def regress(regressor: Regressor, left: Tensor, right: Tensor) -> Regression:
         >>> regress(regressor, *torch.rand(2, 1, 3, 64, 64)).disparity.shape
         torch.Size([1, 1, 64, 64])
     """
-    return regressor.regression(regressor(left, right))
+    return regressor.regression(regressor.see(left, right, stretch))
 
 
-def regress_consistently(regressor: Regressor, left: Tensor, right: Tensor) -> tuple[Regression, Tensor]:
+def regress_consistently(
+    regressor: Regressor, left: Tensor, right: Tensor, stretch: float = 1.0
+) -> tuple[Regression, Tensor]:
     """Predict the left view's disparity and the left-right-consistency map (B, 1, H, W) in one forward pass.
 
     The right view's disparity is that of the swapped views, mirrored (`predict_right`), in the same batch. Arguments as
     for `regress`.
     """
     batch = left.shape[0]
-    both = regress(regressor, torch.cat([left, right.flip(-1)]), torch.cat([right, left.flip(-1)]))
+    views = torch.cat([left, right.flip(-1)]), torch.cat([right, left.flip(-1)])
+    both = regress(regressor, *views, stretch)
     disparity_left, disparity_right = both.disparity[:batch], both.disparity[batch:].flip(-1)
     consistency = left_right_consistency(disparity_left, disparity_right)
     features = {kind: maps[:batch] for kind, maps in both.features.items()}
@@ -70,7 +75,12 @@ def regress_consistently(regressor: Regressor, left: Tensor, right: Tensor) -> t
 
 
 def head_inputs(
-    regressor: Regressor, confnet: ConfNet | None, gradnet: GradNet | None, left: Tensor, right: Tensor
+    regressor: Regressor,
+    confnet: ConfNet | None,
+    gradnet: GradNet | None,
+    left: Tensor,
+    right: Tensor,
+    stretch: float = 1.0,
 ) -> HeadInputs:
     """Run the regressor once and collect the inputs of the heads that there are.
 
@@ -78,13 +88,14 @@ def head_inputs(
         regressor: The network that predicts the disparity.
         confnet, gradnet: None for a head that is not there.
         left, right: (B, 3, H, W) in 0..1, H and W multiples of the regressor's stride.
+        stretch: As for `regress`.
     """
     for_confnet: tuple[Tensor, ...] = ()
     if confnet is None:
-        regression = regress(regressor, left, right)
+        regression = regress(regressor, left, right, stretch)
         cost_features = CostFeatures(left, right, regression.disparity)
     else:
-        regression, consistency = regress_consistently(regressor, left, right)
+        regression, consistency = regress_consistently(regressor, left, right, stretch)
         cost_features = CostFeatures(left, right, regression.disparity)
         for_confnet = confnet.inputs(regression.features[confnet.config.features], consistency, cost_features)
     for_gradnet: tuple[Tensor, ...] = ()
@@ -117,7 +128,8 @@ def estimate(
     """
     fitting = regressor.fitting(*left.shape[-2:])
     stretch_x, stretch_y = fitting.stretch
-    seen = head_inputs(regressor, confnet, gradnet, fitting.apply(left), fitting.apply(right))
+    views = fitting.apply(left), fitting.apply(right)
+    seen = head_inputs(regressor, confnet, gradnet, *views, stretch_x)
     confidence = gradient = None
     if confnet is not None:
         confidence = fitting.undo(confnet.confidence(*seen.confnet))

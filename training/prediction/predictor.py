@@ -214,7 +214,8 @@ def check_images(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> None:
 
 
 def _as_tensor(image: NDArray[np.uint8], device: torch.device) -> Tensor:
-    batch = torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1)[None]
+    # Copied: PyTorch takes no arrays that must not be written, such as Pillow's, without a warning.
+    batch = torch.from_numpy(np.array(image)).permute(2, 0, 1)[None]
     return batch.to(device).float() / 255
 
 

@@ -108,17 +108,29 @@ def test_shifted_window_is_a_slice() -> None:
     np.testing.assert_array_equal(part.disparity, pair.disparity_left[7:27, 5:35])
 
 
-def test_disparity_is_never_interpolated() -> None:
-    """Every value is the zoom times a value of the source, missing ones stay missing."""
+def test_disparity_is_never_interpolated_across_edges() -> None:
+    """Where neighbours lie on different surfaces, every value is the zoom times a value of the source, and missing ones
+    stay missing."""
     rng = np.random.default_rng(0)
     pair = slanted_plane(0)
-    truth = rng.choice(np.float32([0, 1, 7, np.nan]), (HEIGHT, WIDTH))
+    truth = rng.choice(np.float32([0, 2, 7, np.nan]), (HEIGHT, WIDTH))
     sample = cut(
         replace(pair, disparity_left=truth), Window(3.3, 2.7, 1.7, 0.9), (64, 96), (IDENTITY_CURVE,) * 2
     )
     found = np.unique(sample.disparity[~np.isnan(sample.disparity)])
-    np.testing.assert_allclose(found, np.float32(1.7) * np.float32([0, 1, 7]))
+    np.testing.assert_allclose(found, np.float32(1.7) * np.float32([0, 2, 7]))
     assert np.isnan(sample.disparity).mean() == pytest.approx(0.25, abs=0.03)
+
+
+def test_a_zoomed_plane_is_exact() -> None:
+    """The nearest pixel's value would be off by up to half a pixel times the slope."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH] + 0.5
+    truth = (3 + 0.3 * rows + 0.2 * columns).astype(np.float32)
+    window = Window(3.3, 2.7, 1.7, 1.3)
+    sample = cut(replace(slanted_plane(0), disparity_left=truth), window, (64, 96), (IDENTITY_CURVE,) * 2)
+    v, u = np.mgrid[:64, :96] + 0.5
+    expected = 1.7 * (3 + 0.3 * (2.7 + v / 1.3) + 0.2 * (3.3 + u / 1.7))
+    np.testing.assert_allclose(sample.disparity, expected, rtol=1e-5)
 
 
 def test_bilinear_sampling_against_a_loop() -> None:

@@ -119,10 +119,11 @@ def test_a_new_network_begins_with_the_volumes_disparity() -> None:
 
 
 @pytest.mark.parametrize(("height", "width"), [(50, 70), (64, 64), (17, 131), (1, 40), (40, 1)])
-def test_pictures_of_any_size_are_padded_not_resized(height: int, width: int) -> None:
+def test_large_pictures_are_padded_not_resized(height: int, width: int) -> None:
     """The answer is that for the picture with its last row and column repeated, cut back."""
     torch.manual_seed(0)
     network = CostVolumeNet(NARROW).eval()
+    network.enlarged_to_pixels = height * width
     left, right = torch.rand(2, 1, 3, height, width)
     rows = torch.arange(-(-height // 32) * 32).clamp(max=height - 1)
     columns = torch.arange(-(-width // 32) * 32).clamp(max=width - 1)
@@ -130,6 +131,40 @@ def test_pictures_of_any_size_are_padded_not_resized(height: int, width: int) ->
         whole = regress(network, left[:, :, rows][..., columns], right[:, :, rows][..., columns]).disparity
     found = estimate(network, None, None, left, right).disparity
     torch.testing.assert_close(found, whole[..., :height, :width])
+
+
+@pytest.mark.parametrize(
+    ("height", "width", "seen"),
+    [
+        (375, 1242, (576, 1888)),  # by 1.5, to about a million pixels
+        (96, 160, (192, 320)),  # by 2 at most
+        (375, 450, (768, 928)),
+        (1080, 1920, (1088, 1920)),
+    ],
+)
+def test_small_pictures_are_enlarged(height: int, width: int, seen: tuple[int, int]) -> None:
+    assert CostVolumeNet(NARROW).fitting(height, width).size == seen
+
+
+def test_an_enlarged_pair_gives_disparities_of_its_own_pixels() -> None:
+    """The answer is that for the pair enlarged by hand, brought back; it looks as far in the pictures."""
+    torch.manual_seed(0)
+    network = CostVolumeNet(NARROW).eval()
+    left, right = torch.rand(2, 1, 3, 48, 96)
+    size = (96, 192)
+    larger = [
+        F.interpolate(view, size=size, mode="bicubic", align_corners=False, antialias=True).clamp(0, 1)
+        for view in (left, right)
+    ]
+    with torch.no_grad():
+        seen = network(*larger, disparity_range=128)
+        expected = F.avg_pool2d(F.relu(seen.disparity), 2) / 2
+    assert seen.scores.shape[-1] == 128 // 4
+    found = estimate(network, None, None, left, right).disparity
+    torch.testing.assert_close(found, expected, rtol=1e-4, atol=1e-4)
+    network.look_up_to(32)
+    with torch.no_grad():
+        assert network.see(*larger, stretch=2).scores.shape[-1] == 64 // 4
 
 
 def test_the_range_can_be_set_and_changes_no_weights() -> None:
@@ -145,7 +180,7 @@ def test_the_range_can_be_set_and_changes_no_weights() -> None:
 
 
 @pytest.mark.parametrize(
-    ("width", "pixels"), [(32, 32), (320, 160), (450, 192), (1248, 192), (1920, 224), (2976, 352)]
+    ("width", "pixels"), [(32, 32), (320, 96), (450, 128), (1242, 192), (1920, 256), (2976, 384)]
 )
 def test_the_range_suits_the_width(width: int, pixels: int) -> None:
     assert CostVolumeNet(NARROW).disparity_range(width) == pixels
@@ -155,7 +190,7 @@ def test_wide_pictures_are_searched_at_half_their_size_and_looked_at_at_full() -
     network = CostVolumeNet(NARROW).eval()
     left, right = torch.rand(2, 1, 3, 96, 160)
     whole = network(left, right)
-    network.widest_volume_px = 100
+    network.largest_volume_pixels = 10_000
     output = network(left, right)
     assert whole.scores.shape == (1, 24, 40, 16)
     # 48x80, padded to multiples of 32; half the range, in levels of 4

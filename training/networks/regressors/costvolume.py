@@ -31,10 +31,13 @@ from training.networks.cost_volume import (
 from training.networks.initialization import initialize
 from training.networks.regressors.interface import (
     FeatureKind,
+    Fitting,
     Objective,
+    Padding,
     Regression,
     Regressor,
     RegressorConfig,
+    Resizing,
 )
 
 LEAKY_SLOPE = 0.1
@@ -45,6 +48,8 @@ CERTAINTY_CHANNELS = 3
 """Channels of the certainty in `Readout`."""
 LARGEST_DISPARITY_PX = 192
 """Disparities below this are looked for in images of ordinary size, as the field does."""
+LARGEST_ENLARGEMENT = 2.0
+"""Of small pictures."""
 READOUT_REACH = 2
 """Levels on either side of the best that the read-out's expectation is taken over."""
 
@@ -144,9 +149,12 @@ class CostVolumeNet(Regressor):
 
     max_disparity: int | None = None
     """What `look_up_to` set; None chooses by the images' width (`disparity_range`)."""
-    widest_volume_px: int | None = 1600
-    """Wider images are searched at half their size, so that time and memory stay in bounds; None searches all at their
-    own."""
+    largest_volume_pixels: int | None = 2_100_000
+    """Images of more pixels are searched at half their size, so that time and memory stay in bounds; None searches all
+    at their own."""
+    enlarged_to_pixels: int | None = 1_050_000
+    """Pictures are enlarged to about so many pixels, by 2 at most, before the network sees them, since it has fewer
+    fine errors then; None enlarges none."""
     strip_rows: int | None = 96
     """Rows that the third look takes at a time where nothing is trained, since its maps at full resolution fit the
     processor's cache then; None takes all at once."""
@@ -170,11 +178,27 @@ class CostVolumeNet(Regressor):
         self.look.begin_without_change()
         self.full_look.begin_without_change()
 
-    def forward(self, left: Tensor, right: Tensor) -> CostVolumeOutput:
+    def fitting(self, height: int, width: int) -> Fitting:
+        """Pictures are enlarged, if they are small, and stretched to multiples of the stride."""
+        if self.enlarged_to_pixels is None:
+            return Padding(height, width, self.stride)
+        enlargement = math.sqrt(self.enlarged_to_pixels / (height * width))
+        if enlargement <= 1:
+            return Padding(height, width, self.stride)
+        return Resizing(height, width, self.stride, min(enlargement, LARGEST_ENLARGEMENT))
+
+    def see(self, left: Tensor, right: Tensor, stretch: float) -> CostVolumeOutput:
+        """What `forward` returns for images that were made `stretch` times wider; it looks as far in the pictures."""
+        disparity_range = self.disparity_range(round(left.shape[-1] / stretch))
+        return self(left, right, _whole(disparity_range * stretch, self.stride))
+
+    def forward(self, left: Tensor, right: Tensor, disparity_range: int | None = None) -> CostVolumeOutput:
         """Predict the left view's disparity.
 
         Args:
             left, right: (B, 3, H, W) in 0..1, H and W multiples of 32.
+            disparity_range: Disparities from 0 to below this many pixels are looked for, a multiple of 32; None looks
+                as far as a crop may reach, half of its width, but at most 192 px, or as far as `look_up_to` says.
 
         Raises:
             ValueError: the images differ in size, or a size is no multiple of 32.
@@ -182,7 +206,7 @@ class CostVolumeNet(Regressor):
         self.check_images(left, right)
         images = torch.cat([left, right]) - self.image_mean.view(1, 3, 1, 1)
         views = self.descriptors(images)
-        matched = self._match(images, views, self.disparity_range(left.shape[-1]))
+        matched = self._match(images, views, disparity_range or self._range_of_crops(left.shape[-1]))
         coarse, half = matched.disparity, views.half.chunk(2)
         context = views.context.chunk(2)[0]
         seen = self.look(half[0], half[1], context, coarse.detach(), matched.certainty)
@@ -194,7 +218,7 @@ class CostVolumeNet(Regressor):
         return CostVolumeOutput(matched.scores, fine[0], fine[1], fine[1] + shift, joined, seen.features)
 
     def _match(self, images: Tensor, views: Views, disparity_range: int) -> Matched:
-        """Search the volume; that of images wider than `widest_volume_px` at half their size, and so on.
+        """Search the volume; that of images of more than `largest_volume_pixels` at half their size, and so on.
 
         Args:
             images: (2B, 3, H, W), the left ones first, mean 0.
@@ -203,7 +227,8 @@ class CostVolumeNet(Regressor):
         """
         guides = [maps.chunk(2)[0] for maps in views.guides]
         weights = self.half_weights(guides[0])
-        if self.widest_volume_px is not None and images.shape[-1] > self.widest_volume_px:
+        most, (height, width) = self.largest_volume_pixels, images.shape[-2:]
+        if most is not None and height * width > most:
             small, size = _halved(images, self.stride)
             below = self._match(small, self.descriptors(small), _whole(disparity_range / 2, self.stride))
             coarse, certainty = (
@@ -233,26 +258,32 @@ class CostVolumeNet(Regressor):
         """The network with one scale and one disparity range for every image size, 0 to 192 px where none was set."""
         network = copy.copy(self)
         network.max_disparity = self.max_disparity or LARGEST_DISPARITY_PX
-        network.widest_volume_px = network.strip_rows = None
+        network.largest_volume_pixels = network.strip_rows = None
         return network
 
     def disparity_range(self, width: int) -> int:
-        """Disparities from 0 to below this many pixels are looked for, a multiple of 32.
+        """Disparities from 0 to below this many pixels are looked for in pictures, a multiple of 32.
 
-        Where nothing was set, it is half of the width, but at most 192 px or, in wide images, an eighth
-        of the width.
+        Where nothing was set, it is a quarter of the width, but at least 64 px and at most 192 px or, in wide pictures,
+        an eighth of the width.
 
         Args:
-            width: Of the images, in pixels.
+            width: Of the pictures, in pixels.
 
         Examples:
-            >>> CostVolumeNet().disparity_range(320), CostVolumeNet().disparity_range(1248)
-            (160, 192)
+            >>> CostVolumeNet().disparity_range(450), CostVolumeNet().disparity_range(1242)
+            (128, 192)
         """
         wanted = self.max_disparity
         if wanted is None:
-            wanted = min(width // 2, max(LARGEST_DISPARITY_PX, width // 8)) // self.stride * self.stride
-        return max(_whole(wanted, self.stride), self.stride)
+            wanted = max(64, min(width // 4, LARGEST_DISPARITY_PX), width // 8)
+        return min(_whole(wanted, self.stride), _whole(width, self.stride))
+
+    def _range_of_crops(self, width: int) -> int:
+        """How far `forward` looks in images of a width if nothing is said."""
+        if self.max_disparity is not None:
+            return self.disparity_range(width)
+        return max(min(width // 2, LARGEST_DISPARITY_PX) // self.stride * self.stride, self.stride)
 
     def regression(self, output: CostVolumeOutput) -> Regression:
         """The disparity after the third look, and the second look's features."""

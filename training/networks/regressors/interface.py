@@ -6,6 +6,7 @@ A new one is one module in this folder with a `Regressor` subclass; it is found 
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -89,6 +90,14 @@ class Regressor(nn.Module, ABC):
         """How images of any size are brought to a size that the network takes."""
         return Padding(height, width, self.stride)
 
+    def see(self, left: Tensor, right: Tensor, stretch: float) -> Any:
+        """What `forward` returns for images (B, 3, H, W) that `fitting` made `stretch` times wider.
+
+        A network that looks for disparities up to so many pixels of the pictures overrides this.
+        """
+        del stretch
+        return self(left, right)
+
     def look_up_to(self, max_disparity: int) -> None:
         """Look for disparities from 0 to this many pixels, instead of what the network chooses by itself.
 
@@ -167,13 +176,25 @@ class Padding(Fitting):
         return maps[..., : self.height, : self.width]
 
 
+@dataclass(frozen=True)
 class Resizing(Fitting):
     """The images are stretched.
 
     Examples:
         >>> Resizing(375, 1242, 64).size
         (384, 1280)
+        >>> Resizing(375, 1242, 32, enlargement=1.5).size
+        (576, 1888)
     """
+
+    enlargement: float = 1.0
+    """How many times larger the images become before their sizes become multiples."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) that the network sees: the next multiples of the stride."""
+        height, width = (math.ceil(length * self.enlargement) for length in (self.height, self.width))
+        return _next_multiple(height, self.stride), _next_multiple(width, self.stride)
 
     @property
     def stretch(self) -> tuple[float, float]:
@@ -182,23 +203,24 @@ class Resizing(Fitting):
         return width / self.width, height / self.height
 
     def apply(self, image: Tensor) -> Tensor:
-        """Resize an image (B, C, H, W)."""
-        return resize(image, *self.size)
+        """Resize an image (B, C, H, W), bicubically if it is enlarged, which keeps it sharp."""
+        mode = "bilinear" if self.enlargement == 1 else "bicubic"
+        return resize(image, *self.size, mode).clamp(0, 1)
 
     def undo(self, maps: Tensor) -> Tensor:
-        """Resize maps back."""
-        return resize(maps, self.height, self.width)
+        """Resize maps back, without smoothing, which would mix disparities of two surfaces."""
+        return resize(maps, self.height, self.width, antialias=self.enlargement == 1)
 
 
 def _next_multiple(length: int, stride: int) -> int:
     return -(-length // stride) * stride
 
 
-def resize(maps: Tensor, height: int, width: int) -> Tensor:
-    """Resize maps (B, C, h, w) bilinearly to (B, C, height, width), antialiased when shrinking.
+def resize(maps: Tensor, height: int, width: int, mode: str = "bilinear", antialias: bool = True) -> Tensor:
+    """Resize maps (B, C, h, w) to (B, C, height, width), antialiased when shrinking unless that is not wanted.
 
     Returns the maps themselves if they have that size already.
     """
     if maps.shape[-2:] == (height, width):
         return maps
-    return F.interpolate(maps, size=(height, width), mode="bilinear", align_corners=False, antialias=True)
+    return F.interpolate(maps, size=(height, width), mode=mode, align_corners=False, antialias=antialias)
