@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 from datagen.cameras.calibration import Calibration
 from datagen.cameras.registry import read_calibration
 from datagen.cameras.reprojection import points_of_depth
-from datagen.errors import FormatError
-from datagen.formats.disparity.registry import write_disparity
 from datagen.formats.point_cloud import write_point_cloud
 from stereoforge.errors import CommandError
 from stereoforge.inputs.images import pair_doubts, read_color_images
 from stereoforge.inputs.rig_flags import KnownRig, SimpleRig
 from stereoforge.pipelines.doubts import result_doubts, view_doubts
 from stereoforge.pipelines.prediction import Image
-from stereoforge.pipelines.refined_files import points_kept
+from stereoforge.pipelines.refined_files import points_kept, write_found
 from stereoforge.pipelines.refiner import RefinedPair, StereoRefiner
 from stereoforge_kit.errors import InputError, UserError
 from stereoforge_kit.viewing import Picture, confidence_picture, disparity_picture
@@ -194,13 +192,10 @@ def write_files(
     folder: Path, found: Found, points: tuple[NDArray[np.float64], NDArray[np.uint8]] | None
 ) -> tuple[list[Path], list[str]]:
     """Write what can be downloaded into a folder; the files in the order of `FILE_CONTENTS`, and remarks."""
-    remarks = []
+    remarks: list[str] = []
     maps = (*[found.refined.disparity] * 3, found.refined.confidence)
     for name, values in zip(FILE_CONTENTS, maps, strict=False):
-        try:
-            write_disparity(folder / name, values)
-        except FormatError as error:
-            remarks.append(_without_folders(error, folder / name))
+        remarks += write_found(folder / name, values)
     if points is not None and len(points[0]):
         write_point_cloud(folder / "points.ply", *points)
     return [folder / name for name in FILE_CONTENTS if (folder / name).exists()], remarks

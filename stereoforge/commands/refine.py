@@ -12,13 +12,18 @@ from numpy.typing import NDArray
 
 from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.errors import UsageError
-from stereoforge.inputs.flag_values import check_disparity_scale, check_max_disparity, shown
+from stereoforge.inputs.flag_values import (
+    check_disparity_scale,
+    check_max_disparity,
+    parse_disparity_formats,
+    shown,
+)
 from stereoforge.inputs.images import pair_doubts
 from stereoforge.inputs.results_folder import claim_results
 from stereoforge.inputs.rig_flags import KnownRig, known_rig
 from stereoforge.inputs.stereo_pairs import StereoPair, StereoPairs, open_pairs
 from stereoforge.inputs.videos import VideoPairs
-from stereoforge.pipelines.refined_names import FILES, OVERVIEW
+from stereoforge.pipelines.refined_names import DISPARITY, FILES, OVERVIEW
 from stereoforge.places import check_writable, keep_apart
 from stereoforge.progress import console, progress_bar, remark
 
@@ -68,6 +73,9 @@ class Refine:
     """Largest disparity in pixels to look for. DispNetCorr1D looks as far as it was trained to."""
     parameters: Annotated[Path | None, shown("FILE", "the run folder's, if it has one")] = None
     """The MRF's parameters, as `stereoforge tune` writes them."""
+    also_as: Annotated[str | None, shown("LIST", "PFM only")] = None
+    """Write the refined disparity in these formats too, comma-separated: exr, npy, npz, png (16 bits, value / 256, 0
+    where there is none, as KITTI has it), tiff."""
     form: Annotated[Literal["exact", "paper"] | None, shown("exact|paper", "ours, as validated")] = None
     """Refine by the paper's MRF, whose gradient term is quadratic: exact minimises its energy, paper solves its eq. 8
     as printed."""
@@ -153,7 +161,12 @@ class Refine:
             "deviation": self.deviation,
             "rig": None if rig is None else rig.as_json(),
             "min_confidence": self.min_confidence,
+            "also_as": list(self._other_endings()),
         }
+
+    def _other_endings(self) -> tuple[str, ...]:
+        """Endings of the formats that the disparity is written in besides PFM."""
+        return parse_disparity_formats("--also-as", self.also_as, besides=Path(DISPARITY).suffix)
 
     def _refine(self, refiner: StereoRefiner, pair: StereoPair, rig: KnownRig | None) -> list[str]:
         """Refine one pair, write its results, and return what is to be said of it, the result last."""
@@ -181,7 +194,7 @@ class Refine:
         if rig is not None:
             calibration, said = rig.calibration((size[1], size[0]))
             remarks += said
-        remarks += write_refined(out, left, refined, calibration, self.min_confidence)
+        remarks += write_refined(out, left, refined, calibration, self.min_confidence, self._other_endings())
         doubts = [] if odd else view_doubts(left, right)
         if given[0] is not None:
             doubts += disparity_doubts(given[0])
@@ -206,7 +219,8 @@ class Refine:
                 keep_apart("--out", self.out, flag, read)
         if not 0 <= self.min_confidence <= 1:
             raise UsageError(f"--min-confidence must lie between 0 and 1, got {self.min_confidence}")
-        for name in (*FILES, SIDE_BY_SIDE):
+        others = [str(Path(DISPARITY).with_suffix(ending)) for ending in self._other_endings()]
+        for name in (*FILES, *others, SIDE_BY_SIDE):
             keep_apart("--out", self.out / name, "LEFT", self.left)
             keep_apart("--out", self.out / name, "RIGHT", self.right)
             keep_apart("--out", self.out / name, "--disparity", self.disparity)

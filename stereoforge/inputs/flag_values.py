@@ -122,6 +122,29 @@ def parse_methods(text: str) -> tuple[str, ...]:
     return names
 
 
+def parse_disparity_formats(flag: str, text: str | None, besides: str) -> tuple[str, ...]:
+    """Endings of disparity files, with their dots, out of "png,npy"; none for None.
+
+    Args:
+        flag: Names the flag in errors.
+        text: The flag's value.
+        besides: The ending that is written anyway.
+    """
+    from datagen.formats.disparity import disparity_formats
+
+    there_are = {each.endings[0] for each in disparity_formats().values()} - {besides}
+    endings = [
+        f".{name.strip().lower().removeprefix('.')}" for name in (text or "").split(",") if name.strip()
+    ]
+    for ending in endings:
+        if ending not in there_are:
+            names = ", ".join(sorted(ending[1:] for ending in there_are))
+            raise UsageError(
+                f"{flag} takes names of formats, comma-separated, of {names}, not {ending[1:]!r}"
+            )
+    return tuple(dict.fromkeys(endings))
+
+
 def check_disparity_scale(scale: float | None, flag: str, disparity: Path | None) -> None:
     """Raise UsageError for a --disparity-scale that is not positive, or without the flag that gives disparities."""
     if scale is None:

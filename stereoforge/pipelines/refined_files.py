@@ -12,6 +12,7 @@ from datagen.cameras.reprojection import points_of_depth
 from datagen.formats import write_gradient, write_pfm, write_png
 from datagen.formats.depth_exr import write_depth
 from datagen.formats.depth_png import FARTHEST_M, write_depth_png
+from datagen.formats.disparity import PNG_UNITS_PER_PX, write_disparity
 from datagen.formats.point_cloud import write_point_cloud
 from datagen.ground_truth.labels import gradient_validity
 from refine.report.overview import overview_picture
@@ -20,13 +21,20 @@ from stereoforge.pipelines.refined_names import DISPARITY, OVERVIEW
 from stereoforge.pipelines.refiner import RefinedPair
 from stereoforge_kit.files import replacing
 
+LARGEST_PNG_PX = np.iinfo(np.uint16).max / PNG_UNITS_PER_PX
+"""The largest disparity that a 16-bit PNG file holds."""
 STEP_PX = 1.0
 """A pixel whose disparity differs by more from a neighbour's lies at the edge of a surface, and its point may hang in
 the air between that surface and the next."""
 
 
 def write_refined(
-    out: Path, left: Image, refined: RefinedPair, calibration: Calibration | None, min_confidence: float
+    out: Path,
+    left: Image,
+    refined: RefinedPair,
+    calibration: Calibration | None,
+    min_confidence: float,
+    also_as: tuple[str, ...] = (),
 ) -> list[str]:
     """Write what was found for one pair, and return remarks about it.
 
@@ -36,6 +44,7 @@ def write_refined(
         refined: What was found.
         calibration: Of the pair; None writes neither depth nor points.
         min_confidence: Pixels of lower confidence are no points.
+        also_as: Endings of the formats that the disparity is written in besides PFM.
     """
     remarks: list[str] = []
     # A slope is predicted everywhere; only the differences inside the image exist.
@@ -46,13 +55,29 @@ def write_refined(
     if refined.deviation is not None:
         write_pfm(out / "deviation.pfm", refined.deviation)
     write_gradient(out / "gradient.exr", refined.gradient, inside)
+    for ending in also_as:
+        remarks += write_found(out / f"disparity{ending}", refined.disparity)
     if calibration is not None:
-        remarks = _write_depth(out, left, refined, calibration, min_confidence)
+        remarks += _write_depth(out, left, refined, calibration, min_confidence)
     picture = overview_picture(
         left, refined.initial, refined.confidence, refined.disparity, refined.deviation
     )
     write_png(out / OVERVIEW, picture)
     return remarks
+
+
+def write_found(path: Path, disparity: NDArray[np.float32]) -> list[str]:
+    """Write a disparity (H, W) px in the format of the file's ending, and return a remark if that does not hold all."""
+    if path.suffix != ".png":
+        write_disparity(path, disparity)
+        return []
+    held = disparity <= LARGEST_PNG_PX
+    write_disparity(path, np.where(held, disparity, np.float32(np.nan)))
+    if held.all():
+        return []
+    return [
+        f"{path.name} holds no disparity above {LARGEST_PNG_PX:.0f} px: {1 - held.mean():.1%} of the pixels are 0"
+    ]
 
 
 def _write_depth(

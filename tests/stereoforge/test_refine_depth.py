@@ -10,6 +10,8 @@ import trimesh
 
 from datagen.formats import read_pfm, read_png, write_png
 from datagen.formats.depth_exr import read_depth
+from datagen.formats.disparity import read_disparity_map
+from stereoforge.pipelines.refined_files import write_found
 from tests.stereoforge.test_refine_many import SHIFT_PX, picture_pair, told
 
 FOCAL_PX, BASELINE_M, DOFFS = 500.0, 0.1, 2.0
@@ -87,3 +89,29 @@ def test_impossible_flags(
 ) -> None:
     assert sentence in told(capsys, 2, *pair, "--out", tmp_path / "out", *flags)
     assert not (tmp_path / "out").exists()
+
+
+def test_the_disparity_in_other_formats(
+    pair: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All hold what disparity.pfm holds, the PNG file to half of its unit; a format there is not is refused first."""
+    out = tmp_path / "out"
+    told(capsys, 0, *pair, "--out", out, "--also-as", "png, npy,npz,tiff,.EXR")
+    disparity = read_pfm(out / "disparity.pfm")
+    for ending in ("npy", "npz", "tiff", "exr"):
+        np.testing.assert_array_equal(read_disparity_map(out / f"disparity.{ending}"), disparity)
+    np.testing.assert_allclose(read_disparity_map(out / "disparity.png"), disparity, atol=1 / 512)
+
+    refused = told(capsys, 2, *pair, "--out", tmp_path / "none", "--also-as", "png,jpg")
+    assert (
+        "--also-as takes names of formats, comma-separated, of exr, npy, npz, png, tiff, not 'jpg'" in refused
+    )
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_png_file_says_what_it_does_not_hold(tmp_path: Path) -> None:
+    disparity = np.array([[1.5, 300.0], [2.25, 255.5]], np.float32)
+    remarks = write_found(tmp_path / "disparity.png", disparity)
+    assert remarks == ["disparity.png holds no disparity above 256 px: 25.0% of the pixels are 0"]
+    found = read_disparity_map(tmp_path / "disparity.png")
+    np.testing.assert_array_equal(found, [[1.5, np.nan], [2.25, 255.5]])
