@@ -38,7 +38,9 @@ def test_refining_without_torch_is_the_same(tmp_path: Path) -> None:
     words = [EXAMPLE, exported.path, tmp_path / "left.png", tmp_path / "right.png", tmp_path / "out.pfm"]
     subprocess.run([sys.executable, "-c", WITHOUT_TORCH, *map(str, words)], check=True, timeout=300)
 
-    found = StereoPredictor(tmp_path, max_disparity=192).predict(left, right)
+    predictor = StereoPredictor(tmp_path, max_disparity=192)
+    predictor.networks[0].enlarged_to_pixels = None  # the model takes pictures as they are
+    found = predictor.predict(left, right)
     assert found.confidence is not None
     assert found.gradient is not None
     expected = refine_disparity(found.disparity, found.confidence, found.gradient, left)
