@@ -15,6 +15,7 @@ from datagen.cameras.registry import read_calibration
 from datagen.formats import read_png, write_png
 from stereoforge.cli import main
 from tests.stereoforge.raw_rigs import SIZE, WALL, WALL_M, RawRig, brown_rig, fisheye_rig
+from tests.stereoforge.test_refine_videos import write_video
 
 RIGS = {"brown": brown_rig, "fisheye": fisheye_rig}
 
@@ -180,6 +181,27 @@ def test_folders_go_on_and_are_not_mixed(
     write_png(tmp_path / "left" / "b.png", small)
     assert "is of pictures of 480x360, but this is 480x300" in said(capsys, 1, *words, folder / "rig.yml")
     assert not (out / "right" / "b.png").exists()
+
+
+def test_videos_frame_by_frame(
+    raw_pair: tuple[Path, RawRig], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each frame becomes the picture that it would be on its own, but for the video's compression."""
+    folder, _ = raw_pair
+    views = {view: read_png(folder / f"{view}.png") for view in ("left", "right")}
+    videos = [write_video(tmp_path / f"{view}.mp4", [picture] * 2) for view, picture in views.items()]
+    out, alone = tmp_path / "out", tmp_path / "alone"
+    rig = ("--calibration", folder / "rig.yml")
+    assert "2 pairs rectified, 0 were there" in said(capsys, 0, "rectify", *videos, "--out", out, *rig)
+    raw = (folder / "left.png", folder / "right.png")
+    said(capsys, 0, "rectify", *raw, "--out", alone, *rig)
+    for view in views:
+        frames = sorted((out / view).iterdir())
+        assert [frame.name for frame in frames] == ["frame_000000.png", "frame_000001.png"]
+        expected = read_png(alone / f"{view}.png").astype(int)
+        for frame in frames:
+            assert np.abs(read_png(frame) - expected).mean() < 8
+    assert "0 pairs rectified, 2 were there" in said(capsys, 0, "rectify", *videos, "--out", out, *rig)
 
 
 WRONG = [
