@@ -192,6 +192,9 @@ SLANTED_AUGMENTATION = replace(SMALL_AUGMENTATION, shear=0.6)
 """For heads: some crops are sheared, since roads are slanted and flying things are not. A run of 200 steps (`tiny`) is
 too short to learn from it (docs/ablations.md)."""
 
+HEAD_AUGMENTATION = replace(SLANTED_AUGMENTATION, log_zoom=(-0.1, 0.6))
+"""For the heads of a regressor, which may see pictures enlarged."""
+
 SMALL_OPTIMIZER = OptimizerConfig(
     learning_rate=1e-3, schedule="cosine", warmup_steps=500, epsilon=1e-8, weight_decay=1e-4, clip_norm=1.0
 )
@@ -273,7 +276,7 @@ TINY_COSTVOLUME = replace(
     steps=600,
     crop_width=320,
     crop_height=160,
-    augmentation=SMALL_AUGMENTATION,
+    augmentation=replace(SMALL_AUGMENTATION, log_zoom=(0.1, 0.75)),
     optimizer=replace(SMALL_COSTVOLUME.optimizer, learning_rate=2e-3, warmup_steps=40),
     validation_interval=200,
     validation_samples=16,
@@ -353,7 +356,7 @@ SMALL_CONFNET = ConfNetPreset(
     crop_width=320,
     crop_height=128,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=100),
-    augmentation=SLANTED_AUGMENTATION,
+    augmentation=HEAD_AUGMENTATION,
     network=HeadConfig(
         width=32,
         hidden=64,
@@ -395,7 +398,7 @@ SMALL_GRADNET = GradNetPreset(
     crop_width=320,
     crop_height=128,
     optimizer=replace(SMALL_OPTIMIZER, warmup_steps=100),
-    augmentation=SLANTED_AUGMENTATION,
+    augmentation=HEAD_AUGMENTATION,
     network=replace(SMALL_CONFNET.network, dropout=0.0, dilations=WIDE_DILATIONS),
     validation_interval=500,
 )

@@ -35,6 +35,9 @@ class Demo:
         result = run_demo(self.out, device=self.device)
         console.print(summary_table(result.evaluation, "networks trained just now"))
         console.print(summary_table(result.bundled, "bundled weights, same frames"))
+        console.print("where the time went:")
+        for title, seconds in result.seconds.items():
+            console.print(f"  {seconds:5.0f} s  {title}", markup=False)
         console.print(
             f"Made in {result.minutes:.1f} minutes: a toy by its training, the real thing in every step.\n"
             f"  pictures of the data set   {result.gallery}\n"

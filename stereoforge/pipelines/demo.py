@@ -17,7 +17,7 @@ from refine.evaluation.evaluate import Evaluation
 from refine.evaluation.results import EvaluatedSet
 from refine.evaluation.settings import Settings
 from scenes.families.flying_things import FlyingThingsConfig
-from stereoforge.bundled_weights import PAPER_WEIGHTS
+from stereoforge.bundled_weights import BUNDLED_WEIGHTS
 from stereoforge.pipelines.prediction import open_predictors, open_settings
 from stereoforge.pipelines.rendering import render_all
 from stereoforge.pipelines.set_evaluation import (
@@ -34,7 +34,7 @@ from training.devices import parse_device
 from training.runs.request import TrainingRequest
 from training.runs.train import train
 
-NETWORKS = ("regressor", "confnet", "gradnet", "regressor_f")
+NETWORKS = ("regressor", "confnet", "gradnet")
 TOO_FEW = " They are too few for error bars."
 SHIPPED_METHODS = ("regressor", "gradnet", "ours", "ours_conf_gt")
 """What is run with the bundled weights, to show what more training brings."""
@@ -50,9 +50,7 @@ class DemoPlan:
         )
     )
     scenes: dict[str, int] = field(default_factory=lambda: {"train": 24, "val": 4, "test": 4})
-    steps: dict[str, int] = field(
-        default_factory=lambda: {"regressor": 1100, "confnet": 200, "gradnet": 200, "regressor_f": 100}
-    )
+    steps: dict[str, int] = field(default_factory=lambda: {"regressor": 600, "confnet": 200, "gradnet": 200})
     """Training steps of each network's `tiny` preset."""
     samples: int = 2
     """Paths a pixel."""
@@ -72,6 +70,9 @@ class DemoResult:
     bundled: Evaluation
     """Of the networks that come with StereoForge, on the same frames."""
     minutes: float
+    """Of all runs that it took."""
+    seconds: dict[str, float]
+    """Of each stage of this run, by its title."""
 
 
 def run_demo(out: Path, plan: DemoPlan | None = None, device: str = "auto") -> DemoResult:
@@ -99,7 +100,7 @@ def run_demo(out: Path, plan: DemoPlan | None = None, device: str = "auto") -> D
                     ((data, 1.0),),
                     weights,
                     "tiny",
-                    network="dispnet",
+                    network="costvolume",
                     steps=plan.steps[network],
                     resume=True,
                     device=device,
@@ -107,7 +108,7 @@ def run_demo(out: Path, plan: DemoPlan | None = None, device: str = "auto") -> D
             )
     (test,) = open_test_data([str(data)], "test")
     # There is no time to choose parameters here; the bundled ones were chosen on a validation set of such worlds.
-    settings = open_settings(None, PAPER_WEIGHTS)
+    settings = open_settings(None, BUNDLED_WEIGHTS)
     with clock.stage(f"refining and evaluating {len(test.frames)} test pairs"):
         evaluated = evaluate_set(test, open_predictors(weights, device), settings.rows())
     with clock.stage("the same with the networks that come with StereoForge"):
@@ -121,14 +122,16 @@ def run_demo(out: Path, plan: DemoPlan | None = None, device: str = "auto") -> D
         title="StereoForge demo",
         facts={"Parameters": describe_settings(settings)},
     )
-    return DemoResult(data, weights, gallery, files.html, evaluated.evaluation, bundled.evaluation, minutes)
+    return DemoResult(
+        data, weights, gallery, files.html, evaluated.evaluation, bundled.evaluation, minutes, clock.stages
+    )
 
 
 def _evaluate_bundled(test: TestData, settings: Settings, device: str) -> EvaluatedSet:
     """The bundled weights on the demo's test frames."""
-    facts = {**test.facts, "Networks": "bundled: " + "; ".join(describe_networks(PAPER_WEIGHTS))}
+    facts = {**test.facts, "Networks": "bundled: " + "; ".join(describe_networks(BUNDLED_WEIGHTS))}
     named = replace(test, name=f"{test.name}, bundled weights", facts=facts)
-    return evaluate_set(named, open_predictors(PAPER_WEIGHTS, device), settings.rows(SHIPPED_METHODS))
+    return evaluate_set(named, open_predictors(BUNDLED_WEIGHTS, device), settings.rows(SHIPPED_METHODS))
 
 
 class _Clock:
@@ -136,6 +139,8 @@ class _Clock:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self.stages: dict[str, float] = {}
+        """Seconds of each stage of this run, by its title."""
         try:
             self.seconds = float(path.read_text())
         except (OSError, ValueError):
@@ -151,6 +156,7 @@ class _Clock:
         finally:
             passed = time.monotonic() - started
             self.seconds += passed
+            self.stages[title] = passed
             write_text(self._path, f"{self.seconds:.0f}\n")
         console.print(f"    {passed:.0f} s")
 

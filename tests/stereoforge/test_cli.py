@@ -41,7 +41,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, DemoResult]:
     """The demo with next to no scenes and steps: every stage is the real one."""
     plan = DemoPlan(
         scenes={"train": 2, "val": 1, "test": 1},
-        steps={"regressor": 3, "confnet": 2, "gradnet": 2, "regressor_f": 2},
+        steps={"regressor": 3, "confnet": 2, "gradnet": 2},
     )
     small = DemoPlan(type(plan.world)(width=384, height=192), plan.scenes, plan.steps, gallery_scenes=2)
     out = tmp_path_factory.mktemp("demo") / "demo"
@@ -244,7 +244,7 @@ def test_no_data_and_wrong_folders_are_sentences(tmp_path: Path, refused: Callab
 def test_the_demo_leaves_what_it_promises(demo: tuple[Path, DemoResult]) -> None:
     out, result = demo
     numbers = json.loads((out / "report" / "results.json").read_text())
-    assert set(numbers["sets"][0]["methods"]) == set(known_methods())
+    assert set(numbers["sets"][0]["methods"]) == set(known_methods()) - {"regressor_f"}
     assert all(row["seconds"] > 0 for row in numbers["sets"][0]["methods"].values())
     for page in (result.report, result.gallery):
         text = page.read_text()
@@ -279,7 +279,7 @@ def test_the_demo_continues_what_is_there(demo: tuple[Path, DemoResult]) -> None
     plan = DemoPlan(
         type(DemoPlan().world)(width=384, height=192),
         {"train": 2, "val": 1, "test": 1},
-        {"regressor": 3, "confnet": 2, "gradnet": 2, "regressor_f": 2},
+        {"regressor": 3, "confnet": 2, "gradnet": 2},
         gallery_scenes=2,
     )
     run_demo(out, plan)
