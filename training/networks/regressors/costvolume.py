@@ -189,7 +189,7 @@ class CostVolumeNet(Regressor):
 
     def see(self, left: Tensor, right: Tensor, stretch: float) -> CostVolumeOutput:
         """What `forward` returns for images that were made `stretch` times wider; it looks as far in the pictures."""
-        disparity_range = self.disparity_range(round(left.shape[-1] / stretch))
+        disparity_range = self.disparity_range(left.shape[-1] / stretch)
         return self(left, right, _whole(disparity_range * stretch, self.stride))
 
     def forward(self, left: Tensor, right: Tensor, disparity_range: int | None = None) -> CostVolumeOutput:
@@ -261,7 +261,7 @@ class CostVolumeNet(Regressor):
         network.largest_volume_pixels = network.strip_rows = None
         return network
 
-    def disparity_range(self, width: int) -> int:
+    def disparity_range(self, width: float) -> int:
         """Disparities from 0 to below this many pixels are looked for in pictures, a multiple of 32.
 
         Where nothing was set, it is a quarter of the width, but at least 64 px and at most 192 px or, in wide pictures,
@@ -274,9 +274,9 @@ class CostVolumeNet(Regressor):
             >>> CostVolumeNet().disparity_range(450), CostVolumeNet().disparity_range(1242)
             (128, 192)
         """
-        wanted = self.max_disparity
-        if wanted is None:
-            wanted = max(64, min(width // 4, LARGEST_DISPARITY_PX), width // 8)
+        if self.max_disparity is not None:  # at every width, also in a graph that is traced
+            return _whole(self.max_disparity, self.stride)
+        wanted = max(64, min(width / 4, LARGEST_DISPARITY_PX), width / 8)
         return min(_whole(wanted, self.stride), _whole(width, self.stride))
 
     def _range_of_crops(self, width: int) -> int:
