@@ -5,6 +5,7 @@ Training, validation and `training.prediction.predictor.StereoPredictor` all go 
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import torch
@@ -14,7 +15,12 @@ from training.networks.confnet import ConfNet
 from training.networks.cost_features import CostFeatures
 from training.networks.gradnet import GradNet
 from training.networks.lrc import left_right_consistency
-from training.networks.regressors.interface import Regression, Regressor
+from training.networks.regressors.interface import Fitting, Regression, Regressor
+
+DIFFERENT_PX = 1.5
+"""Two answers whose disparities differ by more are different answers."""
+SURER_BY = 0.1
+"""A second answer must be surer by more than this to be taken."""
 
 
 class HeadInputs(NamedTuple):
@@ -110,10 +116,8 @@ def estimate(
 ) -> Estimate:
     """Predict disparity, confidence and gradient of images of any size.
 
-    The images are brought to multiples of the regressor's stride as it wants them, and the outputs are brought back.
-    With the input stretched by (sx, sy), a disparity comes out sx times too large. The horizontal gradient comes out
-    unchanged, since disparity and pixels are stretched alike; the vertical one comes out sx / sy times too large. All
-    are corrected here.
+    The images are brought to multiples of the regressor's stride as it wants them, and the outputs are brought back. If
+    it sees them at two sizes and there is a ConfNet, the surer answer is taken at each pixel (`surer`).
 
     Args:
         regressor, confnet, gradnet: The networks, in evaluation mode; None for a head that is not there.
@@ -126,7 +130,28 @@ def estimate(
         >>> found.disparity.shape, found.confidence
         (torch.Size([1, 1, 50, 70]), None)
     """
-    fitting = regressor.fitting(*left.shape[-2:])
+    fittings = regressor.fittings(*left.shape[-2:])
+    answers = [
+        _estimate_at(fitting, regressor, confnet, gradnet, left, right)
+        for fitting in (fittings if confnet is not None else fittings[:1])
+    ]
+    return functools.reduce(surer, answers)
+
+
+def _estimate_at(
+    fitting: Fitting,
+    regressor: Regressor,
+    confnet: ConfNet | None,
+    gradnet: GradNet | None,
+    left: Tensor,
+    right: Tensor,
+) -> Estimate:
+    """`estimate` of images at one size.
+
+    With the input stretched by (sx, sy), a disparity comes out sx times too large. The horizontal gradient comes out
+    unchanged, since disparity and pixels are stretched alike; the vertical one comes out sx / sy times too large. All
+    are corrected here.
+    """
     stretch_x, stretch_y = fitting.stretch
     views = fitting.apply(left), fitting.apply(right)
     seen = head_inputs(regressor, confnet, gradnet, *views, stretch_x)
@@ -137,3 +162,29 @@ def estimate(
         gradient = fitting.undo(gradnet(*seen.gradnet))
         gradient = gradient * gradient.new_tensor([1.0, stretch_y / stretch_x]).view(1, 2, 1, 1)
     return Estimate(fitting.undo(seen.regression.disparity) / stretch_x, confidence, gradient)
+
+
+def surer(first: Estimate, second: Estimate) -> Estimate:
+    """The first answer, but the second where both differ and that is surer.
+
+    Args:
+        first, second: Of one pair, with confidences.
+
+    Examples:
+        >>> first = Estimate(torch.tensor([5.0, 5.0, 5.0]), torch.tensor([0.5, 0.5, 0.9]), None)
+        >>> second = Estimate(torch.tensor([5.5, 9.0, 9.0]), torch.tensor([0.9, 0.9, 0.9]), None)
+        >>> surer(first, second).disparity.tolist()
+        [5.0, 9.0, 5.0]
+    """
+    assert first.confidence is not None
+    assert second.confidence is not None
+    differ = (first.disparity - second.disparity).abs() > DIFFERENT_PX
+    better = differ & (second.confidence > first.confidence + SURER_BY)
+    gradient = None
+    if first.gradient is not None and second.gradient is not None:
+        gradient = torch.where(better, second.gradient, first.gradient)
+    return Estimate(
+        torch.where(better, second.disparity, first.disparity),
+        torch.where(better, second.confidence, first.confidence),
+        gradient,
+    )

@@ -42,7 +42,7 @@ class Prediction:
 class StereoPredictor:
     """The networks of a run folder, ready to predict.
 
-    Images of any size are brought to one that the regressor takes (`Regressor.fitting`), and the outputs back.
+    Images of any size are brought to those that the regressor takes (`Regressor.fittings`), and the outputs back.
     """
 
     def __init__(

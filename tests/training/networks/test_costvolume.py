@@ -143,7 +143,9 @@ def test_large_pictures_are_padded_not_resized(height: int, width: int) -> None:
     ],
 )
 def test_small_pictures_are_enlarged(height: int, width: int, seen: tuple[int, int]) -> None:
-    assert CostVolumeNet(NARROW).fitting(height, width).size == seen
+    finest, *others = CostVolumeNet(NARROW).fittings(height, width)
+    assert finest.size == seen
+    assert [each.stretch for each in others] == ([] if finest.stretch == (1.0, 1.0) else [(1.0, 1.0)])
 
 
 def test_an_enlarged_pair_gives_disparities_of_its_own_pixels() -> None:

@@ -115,8 +115,8 @@ class PlaneOracle(nn.Module):
     def stretch(self, view: Tensor) -> tuple[float, float]:
         return view.shape[-1] / self.size[1], view.shape[-2] / self.size[0]
 
-    def fitting(self, height: int, width: int) -> Fitting:
-        return Resizing(height, width, 64)
+    def fittings(self, height: int, width: int) -> tuple[Fitting, ...]:
+        return (Resizing(height, width, 64),)
 
     def regression(self, disparity: Tensor) -> Regression:
         features = torch.zeros(1, 1, 2, 2)

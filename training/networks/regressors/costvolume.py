@@ -178,14 +178,16 @@ class CostVolumeNet(Regressor):
         self.look.begin_without_change()
         self.full_look.begin_without_change()
 
-    def fitting(self, height: int, width: int) -> Fitting:
-        """Pictures are enlarged, if they are small, and stretched to multiples of the stride."""
-        if self.enlarged_to_pixels is None:
-            return Padding(height, width, self.stride)
+    def fittings(self, height: int, width: int) -> tuple[Fitting, ...]:
+        """Small pictures are enlarged, for fine errors, and seen as they are for a second opinion.
+
+        The network sees more around a pixel at once then, which tells how far away plain walls are.
+        """
+        own = Padding(height, width, self.stride)
+        if self.enlarged_to_pixels is None or height * width >= self.enlarged_to_pixels:
+            return (own,)
         enlargement = math.sqrt(self.enlarged_to_pixels / (height * width))
-        if enlargement <= 1:
-            return Padding(height, width, self.stride)
-        return Resizing(height, width, self.stride, min(enlargement, LARGEST_ENLARGEMENT))
+        return Resizing(height, width, self.stride, min(enlargement, LARGEST_ENLARGEMENT)), own
 
     def see(self, left: Tensor, right: Tensor, stretch: float) -> CostVolumeOutput:
         """What `forward` returns for images that were made `stretch` times wider; it looks as far in the pictures."""

@@ -86,12 +86,16 @@ class Regressor(nn.Module, ABC):
         """The parameters with weight decay: all of them, unless a network overrides this."""
         return self.parameters()
 
-    def fitting(self, height: int, width: int) -> Fitting:
-        """How images of any size are brought to a size that the network takes."""
-        return Padding(height, width, self.stride)
+    def fittings(self, height: int, width: int) -> tuple[Fitting, ...]:
+        """How images of any size are brought to sizes that the network takes.
+
+        The first gives the finest answer. Further ones are for a second opinion, which is asked for where a ConfNet can
+        tell whose is better.
+        """
+        return (Padding(height, width, self.stride),)
 
     def see(self, left: Tensor, right: Tensor, stretch: float) -> Any:
-        """What `forward` returns for images (B, 3, H, W) that `fitting` made `stretch` times wider.
+        """What `forward` returns for images (B, 3, H, W) that a fitting made `stretch` times wider.
 
         A network that looks for disparities up to so many pixels of the pictures overrides this.
         """
