@@ -3,11 +3,13 @@
 import pytest
 import torch
 import torch.nn.functional as F  # noqa: N812
-from torch import nn
+from torch import Tensor, nn
 
 from training.errors import TrainingError
 from training.losses import disparity_smooth_l1, level_cross_entropy
 from training.networks import CostVolumeConfig, CostVolumeNet, DispNetConfig, DispNetCorr1D
+from training.networks.cost_features import CostFeatures
+from training.networks.heads import HeadConfig
 from training.networks.inference import estimate, regress
 from training.networks.regressors.costvolume import CostVolumeObjective
 from training.networks.regressors.registry import find_regressor, known_regressors, regressor_for
@@ -167,6 +169,39 @@ def test_an_enlarged_pair_gives_disparities_of_its_own_pixels() -> None:
     network.look_up_to(32)
     with torch.no_grad():
         assert network.see(*larger, stretch=2).scores.shape[-1] == 64 // 4
+
+
+class SureOnTheRight:
+    """Stands for a ConfNet: surer of the picture as it is, but only in its right half."""
+
+    config = HeadConfig()
+
+    def inputs(
+        self, features: Tensor, consistency: Tensor, cost_features: CostFeatures
+    ) -> tuple[Tensor, ...]:
+        assert features.shape[-1] * 2 == consistency.shape[-1] == cost_features.left.shape[-1]
+        return (consistency,)
+
+    def confidence(self, consistency: Tensor) -> Tensor:
+        width = consistency.shape[-1]
+        right = torch.arange(width) >= width // 2
+        return torch.where(right & (width == 96), 0.9, 0.5).expand_as(consistency)
+
+
+def test_the_surer_of_two_sizes_answers() -> None:
+    """At pixels where both differ; without a ConfNet the enlarged pair does."""
+    torch.manual_seed(0)
+    network = CostVolumeNet(NARROW).eval()
+    left, right = torch.rand(2, 1, 3, 64, 96)
+    enlarged = estimate(network, None, None, left, right).disparity
+    found = estimate(network, SureOnTheRight(), None, left, right)  # type: ignore[arg-type]
+    network.enlarged_to_pixels = None
+    own = estimate(network, None, None, left, right).disparity
+    chosen = ((own - enlarged).abs() > 1.5) & (torch.arange(96) >= 48)
+    assert 0.05 < chosen.float().mean() < 0.5
+    torch.testing.assert_close(found.disparity, torch.where(chosen, own, enlarged), rtol=1e-4, atol=1e-3)
+    assert found.confidence is not None
+    torch.testing.assert_close(found.confidence, torch.where(chosen, 0.9, 0.5))
 
 
 def test_the_range_can_be_set_and_changes_no_weights() -> None:
