@@ -130,12 +130,12 @@ def parse_disparity_formats(flag: str, text: str | None, besides: str) -> tuple[
         text: The flag's value.
         besides: The ending that is written anyway.
     """
+    if text is None:
+        return ()
     from datagen.formats.disparity import disparity_formats
 
     there_are = {each.endings[0] for each in disparity_formats().values()} - {besides}
-    endings = [
-        f".{name.strip().lower().removeprefix('.')}" for name in (text or "").split(",") if name.strip()
-    ]
+    endings = [f".{name.strip().lower().removeprefix('.')}" for name in text.split(",") if name.strip()]
     for ending in endings:
         if ending not in there_are:
             names = ", ".join(sorted(ending[1:] for ending in there_are))

@@ -45,14 +45,14 @@ class Estimate(NamedTuple):
     """(B, 2, H, W) px per pixel, [dx, dy]."""
 
 
-def regress(regressor: Regressor, left: Tensor, right: Tensor, stretch: float = 1.0) -> Regression:
+def regress(regressor: Regressor, left: Tensor, right: Tensor, stretch: float | None = None) -> Regression:
     """Predict the left view's disparity.
 
     Args:
         regressor: The network.
         left, right: (B, 3, H, W) in 0..1, H and W multiples of the network's stride.
-        stretch: How many times wider than the pictures these are (`Fitting.stretch`). Disparities are in pixels of
-            `left`; how far the network looks is in those of the pictures.
+        stretch: How many times wider than whole pictures these are (`Fitting.stretch`). Disparities are in pixels of
+            `left`; how far the network looks is in those of the pictures. None for crops, in which `forward` decides.
 
     Examples:
         >>> from training.networks import DispNetConfig, DispNetCorr1D
@@ -60,11 +60,12 @@ def regress(regressor: Regressor, left: Tensor, right: Tensor, stretch: float = 
         >>> regress(regressor, *torch.rand(2, 1, 3, 64, 64)).disparity.shape
         torch.Size([1, 1, 64, 64])
     """
-    return regressor.regression(regressor.see(left, right, stretch))
+    output = regressor(left, right) if stretch is None else regressor.see(left, right, stretch)
+    return regressor.regression(output)
 
 
 def regress_consistently(
-    regressor: Regressor, left: Tensor, right: Tensor, stretch: float = 1.0
+    regressor: Regressor, left: Tensor, right: Tensor, stretch: float | None = None
 ) -> tuple[Regression, Tensor]:
     """Predict the left view's disparity and the left-right-consistency map (B, 1, H, W) in one forward pass.
 
@@ -86,7 +87,7 @@ def head_inputs(
     gradnet: GradNet | None,
     left: Tensor,
     right: Tensor,
-    stretch: float = 1.0,
+    stretch: float | None = None,
 ) -> HeadInputs:
     """Run the regressor once and collect the inputs of the heads that there are.
 

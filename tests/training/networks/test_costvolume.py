@@ -10,7 +10,7 @@ from training.losses import disparity_smooth_l1, level_cross_entropy
 from training.networks import CostVolumeConfig, CostVolumeNet, DispNetConfig, DispNetCorr1D
 from training.networks.cost_features import CostFeatures
 from training.networks.heads import HeadConfig
-from training.networks.inference import estimate, regress
+from training.networks.inference import estimate, head_inputs, regress
 from training.networks.regressors.costvolume import CostVolumeObjective
 from training.networks.regressors.registry import find_regressor, known_regressors, regressor_for
 
@@ -130,7 +130,8 @@ def test_large_pictures_are_padded_not_resized(height: int, width: int) -> None:
     rows = torch.arange(-(-height // 32) * 32).clamp(max=height - 1)
     columns = torch.arange(-(-width // 32) * 32).clamp(max=width - 1)
     with torch.no_grad():
-        whole = regress(network, left[:, :, rows][..., columns], right[:, :, rows][..., columns]).disparity
+        views = left[:, :, rows][..., columns], right[:, :, rows][..., columns]
+        whole = regress(network, *views, stretch=1.0).disparity
     found = estimate(network, None, None, left, right).disparity
     torch.testing.assert_close(found, whole[..., :height, :width])
 
@@ -202,6 +203,19 @@ def test_the_surer_of_two_sizes_answers() -> None:
     torch.testing.assert_close(found.disparity, torch.where(chosen, own, enlarged), rtol=1e-4, atol=1e-3)
     assert found.confidence is not None
     torch.testing.assert_close(found.confidence, torch.where(chosen, 0.9, 0.5))
+
+
+def test_heads_are_trained_on_crops_searched_as_far_as_the_regressors() -> None:
+    """A crop is a part of a picture: what is near in it may be a larger share of its width."""
+    network = CostVolumeNet(NARROW).eval()
+    ranges = []
+    network.aggregation.register_forward_hook(lambda _, inputs, __: ranges.append(4 * inputs[0].shape[-1]))
+    left, right = torch.rand(2, 1, 3, 32, 320)
+    with torch.no_grad():
+        network(left, right)
+        head_inputs(network, None, None, left, right)
+        regress(network, left, right, stretch=1.0)
+    assert ranges == [160, 160, 96]
 
 
 def test_the_range_can_be_set_and_changes_no_weights() -> None:
