@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Literal
 
 import torch
 
@@ -32,6 +33,27 @@ def parse_device(name: str) -> torch.device:
     if name.startswith("cuda"):
         _require_gpu(name, int(found[2] or 0))
     return torch.device(name)
+
+
+PredictionPrecision = Literal["auto", "32", "bf16"]
+"""Bits of the convolutions in prediction; `auto` is bf16 on processors that multiply it in hardware, else 32."""
+
+
+def computes_in_bfloat16(precision: PredictionPrecision, device: torch.device) -> bool:
+    """Whether networks predict in mixed precision with bfloat16.
+
+    Args:
+        precision: What is wanted. `auto` leaves other devices than the CPU at 32 bits, where this was not measured.
+        device: What the networks run on.
+
+    Examples:
+        >>> computes_in_bfloat16("32", torch.device("cpu")), computes_in_bfloat16("bf16", torch.device("cpu"))
+        (False, True)
+    """
+    if precision != "auto":
+        return precision == "bf16"
+    able = torch.cpu.get_capabilities() if device.type == "cpu" else {}
+    return bool(able.get("avx512_bf16") or able.get("amx_bf16"))
 
 
 def _require_gpu(name: str, index: int) -> None:

@@ -255,8 +255,8 @@ RIG_AUGMENTATION = AugmentationConfig(
     erased_size=(30.0, 80.0),
     jpeg=0.2,
 )
-"""Wide zoom, since CostVolumeNet sees pictures enlarged by up to 2 (`CostVolumeNet.fittings`), and what tells the two
-cameras of a real rig apart."""
+"""Wide zoom, since CostVolumeNet sees pictures enlarged by up to 2 (`CostVolumeNet.enlarged_size`), and what tells the
+two cameras of a real rig apart."""
 
 SMALL_COSTVOLUME = RegressorPreset(
     steps=12_000,

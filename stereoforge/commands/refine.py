@@ -97,6 +97,8 @@ class Refine:
     """Of two folders or videos: also write side_by_side.mp4, the left views beside their disparities."""
     device: Annotated[str, shown("NAME")] = "auto"
     """What the networks run on: auto (cuda where there is such a GPU, else cpu), cpu, cuda, cuda:1 or mps."""
+    precision: Literal["auto", "32", "bf16"] = "auto"
+    """Bits of the networks' convolutions; auto is bf16 on processors that multiply it in hardware, else 32."""
 
     def run(self) -> None:
         """Refine every pair and write its results."""
@@ -117,6 +119,7 @@ class Refine:
             form=self.form,
             max_disparity=self.max_disparity,
             device=self.device,
+            precision=self.precision,
         )
         for note in (pairs.note, *refiner.notes):
             if note:

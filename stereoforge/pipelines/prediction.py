@@ -20,6 +20,7 @@ from refine.forest import Forest, load_forest
 from refine.heuristic_inputs import consistency_confidence, local_gradients
 from refine.method import Method
 from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
+from training.devices import PredictionPrecision
 from training.prediction.predictor import Prediction, RegressorFreePredictor, StereoPredictor
 from training.runs.weights import has_weights, weights_path
 
@@ -165,7 +166,7 @@ def open_predictors(
         return Predictors(open_matching(run, device, max_disparity), None)
     fine_tuned = None
     if has_weights(run, "regressor_f"):
-        fine_tuned = StereoPredictor(run, device, "regressor_f", max_disparity)
+        fine_tuned = StereoPredictor(run, device, "regressor_f", max_disparity, "auto")
     return Predictors(
         initial=open_regressor(run, device, max_disparity),
         fine_tuned=fine_tuned,
@@ -174,10 +175,13 @@ def open_predictors(
 
 
 def open_regressor(
-    run: Path, device: str = "cpu", max_disparity: int | None = None
+    run: Path,
+    device: str = "cpu",
+    max_disparity: int | None = None,
+    precision: PredictionPrecision = "auto",
 ) -> StereoPredictor | JudgedRegressor:
     """The regressor of a run folder with its heads or, where it has none, with the regressor-free networks."""
-    regressor = StereoPredictor(run, device, max_disparity=max_disparity)
+    regressor = StereoPredictor(run, device, max_disparity=max_disparity, precision=precision)
     if judged_by(run) == HEADS:
         return regressor
     return JudgedRegressor(RegressorFreePredictor(run, device), regressor)

@@ -33,7 +33,9 @@ from stereoforge.pipelines.prediction import (
     open_settings,
     train_command,
 )
+from stereoforge_kit.allocation import keep_freed_memory
 from stereoforge_kit.errors import InputError
+from training.devices import PredictionPrecision
 from training.prediction.predictor import Prediction
 
 
@@ -72,7 +74,7 @@ class StereoRefiner:
     """Predicts the disparity of rectified pairs and refines it.
 
     The networks are read once, and the solver's kernels stay compiled, so the second pair takes less time than the
-    first.
+    first. The process keeps what it frees from then on (`keep_freed_memory`).
 
     Examples:
         refiner = StereoRefiner()
@@ -89,6 +91,7 @@ class StereoRefiner:
         form: Form | None = None,
         max_disparity: int | None = None,
         device: str = "auto",
+        precision: PredictionPrecision = "auto",
     ) -> None:
         """Read networks and parameters.
 
@@ -100,11 +103,14 @@ class StereoRefiner:
             form: Refine by the paper's quadratic MRF in this form; None refines as the parameters say.
             max_disparity: Largest disparity in pixels to look for; None leaves it to the predictor.
             device: As `training.devices.parse_device` takes it.
+            precision: Bits of the convolutions of a run folder's networks: `32`, `bf16`, or `auto`, which is bf16 on
+                processors that multiply it in hardware. Disparities differ by about 0.03 px in the mean.
 
         Raises:
             CommandError: the run folder has no heads for its regressor.
             TrainingError: anything else that is wrong with the run folder or the device.
         """
+        keep_freed_memory()
         run = named_weights(Path(weights))
         settings = open_settings(parameters, run, predictor)
         self._method: Ours = settings.ours
@@ -118,13 +124,14 @@ class StereoRefiner:
             self._predictor = self._matching = open_matching(run, device, max_disparity)
             self.notes = fallback_notes(run)
         else:
-            self._predictor = open_regressor(run, device, max_disparity)
+            self._predictor = open_regressor(run, device, max_disparity, precision)
         self._run = run
         self.settings: dict[str, Any] = {
             "predictor": predictor,
             "networks": network_digests(run, predictor),
             "method": json.loads(json.dumps(asdict(self._method))),
             "max_disparity": max_disparity,
+            "precision": precision,
         }
         """What decides the results, as JSON values."""
 

@@ -32,8 +32,9 @@ def cosine_volume(left: Tensor, right: Tensor, levels: int) -> Tensor:
     """Products of each left pixel with the right pixels at disparities 0 .. levels - 1.
 
     v[d](y, x) = sum over channels of left(y, x) * right(y, x - d), and 0 where x - d lies outside the image. All
-    products of a row are one matrix product, from which the wanted diagonals are read by skewing its rows (padding and
-    reshaping), so any number of levels costs little, and the graph is the same for every size.
+    products of a row are one matrix product. With the right view mirrored, the products that a left pixel needs lie
+    side by side in it, one place further left for each pixel further right: rows of one less number read them all. So
+    any number of levels costs little, and the graph is the same for every size.
 
     Args:
         left, right: (B, G, C, H, W) of `normalized_groups`, so that products are cosines.
@@ -49,10 +50,14 @@ def cosine_volume(left: Tensor, right: Tensor, levels: int) -> Tensor:
         [3, 3, 3, 3, 3, 3]
     """
     batch, groups, _, height, width = left.shape
-    products = torch.matmul(left.permute(0, 1, 3, 4, 2), right.permute(0, 1, 3, 2, 4))
-    rows = F.pad(products, (levels, 0)).flatten(3)
-    skewed = F.pad(rows, (0, width)).view(batch, groups, height, width, width + levels + 1)
-    return skewed[..., 1 : levels + 1].flip(-1)
+    mirrored = F.pad(right.flip(-1), (0, levels))
+    products = torch.matmul(left.permute(0, 1, 3, 4, 2), mirrored.permute(0, 1, 3, 2, 4)).flatten(3)
+    skewed, first = (
+        width + levels - 1,
+        width - 1,
+    )  # the row's length, and where the first pixel's products begin
+    rows = products[..., first : first + width * skewed].view(batch, groups, height, width, skewed)
+    return rows[..., :levels]
 
 
 def windowed_cosines(left: Tensor, right: Tensor, disparity: Tensor, reach: int) -> Tensor:

@@ -6,6 +6,7 @@ Training, validation and `training.prediction.predictor.StereoPredictor` all go 
 from __future__ import annotations
 
 import functools
+import math
 from typing import NamedTuple
 
 import torch
@@ -15,12 +16,16 @@ from training.networks.confnet import ConfNet
 from training.networks.cost_features import CostFeatures
 from training.networks.gradnet import GradNet
 from training.networks.lrc import left_right_consistency
-from training.networks.regressors.interface import Fitting, Regression, Regressor
+from training.networks.regressors.interface import Regression, Regressor, resize
 
 DIFFERENT_PX = 1.5
 """Two answers whose disparities differ by more are different answers."""
 SURER_BY = 0.1
 """A second answer must be surer by more than this to be taken."""
+REACHED_SHARE = 0.999
+"""Of the pixels of a first answer: the second is looked for up to what so many of them reach."""
+REACH_MARGIN_PX = 8.0
+"""And by this much farther."""
 
 
 class HeadInputs(NamedTuple):
@@ -45,14 +50,21 @@ class Estimate(NamedTuple):
     """(B, 2, H, W) px per pixel, [dx, dy]."""
 
 
-def regress(regressor: Regressor, left: Tensor, right: Tensor, stretch: float | None = None) -> Regression:
+def regress(
+    regressor: Regressor,
+    left: Tensor,
+    right: Tensor,
+    stretch: float | None = None,
+    up_to: float | None = None,
+) -> Regression:
     """Predict the left view's disparity.
 
     Args:
         regressor: The network.
         left, right: (B, 3, H, W) in 0..1, H and W multiples of the network's stride.
-        stretch: How many times wider than whole pictures these are (`Fitting.stretch`). Disparities are in pixels of
-            `left`; how far the network looks is in those of the pictures. None for crops, in which `forward` decides.
+        stretch: How many times wider than whole pictures these are. Disparities are in pixels of `left`; how far the
+            network looks is in those of the pictures. None for crops, in which `forward` decides.
+        up_to: Pixels of the pictures beyond which it need not look, if it can look less far; None for no such limit.
 
     Examples:
         >>> from training.networks import DispNetConfig, DispNetCorr1D
@@ -60,50 +72,82 @@ def regress(regressor: Regressor, left: Tensor, right: Tensor, stretch: float | 
         >>> regress(regressor, *torch.rand(2, 1, 3, 64, 64)).disparity.shape
         torch.Size([1, 1, 64, 64])
     """
-    output = regressor(left, right) if stretch is None else regressor.see(left, right, stretch)
+    output = regressor(left, right) if stretch is None else regressor.see(left, right, stretch, up_to)
     return regressor.regression(output)
 
 
-def regress_consistently(
+def regress_both(
     regressor: Regressor, left: Tensor, right: Tensor, stretch: float | None = None
 ) -> tuple[Regression, Tensor]:
-    """Predict the left view's disparity and the left-right-consistency map (B, 1, H, W) in one forward pass.
+    """Predict the left view's disparity, and the right view's (B, 1, H, W), in one forward pass.
 
-    The right view's disparity is that of the swapped views, mirrored (`predict_right`), in the same batch. Arguments as
-    for `regress`.
+    The right view's is that of the swapped views, mirrored (`predict_right`), in the same batch. Arguments as for
+    `regress`.
     """
     batch = left.shape[0]
     views = torch.cat([left, right.flip(-1)]), torch.cat([right, left.flip(-1)])
     both = regress(regressor, *views, stretch)
-    disparity_left, disparity_right = both.disparity[:batch], both.disparity[batch:].flip(-1)
-    consistency = left_right_consistency(disparity_left, disparity_right)
     features = {kind: maps[:batch] for kind, maps in both.features.items()}
-    return Regression(disparity_left, features), consistency
+    return Regression(both.disparity[:batch], features), both.disparity[batch:].flip(-1)
+
+
+def regress_enlarged(
+    regressor: Regressor,
+    left: Tensor,
+    right: Tensor,
+    size: tuple[int, int],
+    stretch: float,
+    up_to: float | None = None,
+) -> Regression:
+    """What `regress` says of the images enlarged, brought back: in pixels, and of the size, of the images.
+
+    Args:
+        regressor: The network.
+        left, right: (B, 3, H, W) in 0..1.
+        size: (height, width) that they are enlarged to, bicubically, which keeps them sharp.
+        stretch, up_to: As for `regress`.
+    """
+    height, width = left.shape[-2:]
+    factor = size[1] / width
+    larger, other = (resize(view, *size, mode="bicubic").clamp(0, 1) for view in (left, right))
+    found = regressor.rescaled(regress(regressor, larger, other, stretch * factor, up_to), 1 / factor)
+    # Not smoothed, which would mix disparities of two surfaces.
+    disparity = resize(found.disparity, height, width, antialias=False)
+    features = {
+        kind: resize(maps, height // 2, width // 2, antialias=False) for kind, maps in found.features.items()
+    }
+    return Regression(disparity, features)
 
 
 def head_inputs(
-    regressor: Regressor,
-    confnet: ConfNet | None,
-    gradnet: GradNet | None,
-    left: Tensor,
-    right: Tensor,
-    stretch: float | None = None,
+    regressor: Regressor, confnet: ConfNet | None, gradnet: GradNet | None, left: Tensor, right: Tensor
 ) -> HeadInputs:
-    """Run the regressor once and collect the inputs of the heads that there are.
+    """Run the regressor once on crops and collect the inputs of the heads that there are.
 
     Args:
         regressor: The network that predicts the disparity.
         confnet, gradnet: None for a head that is not there.
         left, right: (B, 3, H, W) in 0..1, H and W multiples of the regressor's stride.
-        stretch: As for `regress`.
     """
-    for_confnet: tuple[Tensor, ...] = ()
     if confnet is None:
-        regression = regress(regressor, left, right, stretch)
-        cost_features = CostFeatures(left, right, regression.disparity)
-    else:
-        regression, consistency = regress_consistently(regressor, left, right, stretch)
-        cost_features = CostFeatures(left, right, regression.disparity)
+        return _inputs(regress(regressor, left, right), None, confnet, gradnet, left, right)
+    return _inputs(*regress_both(regressor, left, right), confnet, gradnet, left, right)
+
+
+def _inputs(
+    regression: Regression,
+    disparity_right: Tensor | None,
+    confnet: ConfNet | None,
+    gradnet: GradNet | None,
+    left: Tensor,
+    right: Tensor,
+) -> HeadInputs:
+    """What the heads see of a regression; a ConfNet needs the right view's disparity."""
+    cost_features = CostFeatures(left, right, regression.disparity)
+    for_confnet: tuple[Tensor, ...] = ()
+    if confnet is not None:
+        assert disparity_right is not None
+        consistency = left_right_consistency(regression.disparity, disparity_right)
         for_confnet = confnet.inputs(regression.features[confnet.config.features], consistency, cost_features)
     for_gradnet: tuple[Tensor, ...] = ()
     if gradnet is not None:
@@ -117,8 +161,9 @@ def estimate(
 ) -> Estimate:
     """Predict disparity, confidence and gradient of images of any size.
 
-    The images are brought to multiples of the regressor's stride as it wants them, and the outputs are brought back. If
-    it sees them at two sizes and there is a ConfNet, the surer answer is taken at each pixel (`surer`).
+    The images are brought to multiples of the regressor's stride as it wants them, and the outputs are brought back.
+    Small ones it may see enlarged. With a ConfNet they are seen as they are too, both views, and the surer of the two
+    answers is taken at each pixel (`surer`). The heads judge both at the images' own size.
 
     Args:
         regressor, confnet, gradnet: The networks, in evaluation mode; None for a head that is not there.
@@ -131,38 +176,46 @@ def estimate(
         >>> found.disparity.shape, found.confidence
         (torch.Size([1, 1, 50, 70]), None)
     """
-    fittings = regressor.fittings(*left.shape[-2:])
-    answers = [
-        _estimate_at(fitting, regressor, confnet, gradnet, left, right)
-        for fitting in (fittings if confnet is not None else fittings[:1])
-    ]
-    return functools.reduce(surer, answers)
-
-
-def _estimate_at(
-    fitting: Fitting,
-    regressor: Regressor,
-    confnet: ConfNet | None,
-    gradnet: GradNet | None,
-    left: Tensor,
-    right: Tensor,
-) -> Estimate:
-    """`estimate` of images at one size.
-
-    With the input stretched by (sx, sy), a disparity comes out sx times too large. The horizontal gradient comes out
-    unchanged, since disparity and pixels are stretched alike; the vertical one comes out sx / sy times too large. All
-    are corrected here.
-    """
+    fitting = regressor.fitting(*left.shape[-2:])
     stretch_x, stretch_y = fitting.stretch
     views = fitting.apply(left), fitting.apply(right)
-    seen = head_inputs(regressor, confnet, gradnet, *views, stretch_x)
-    confidence = gradient = None
-    if confnet is not None:
-        confidence = fitting.undo(confnet.confidence(*seen.confnet))
-    if gradnet is not None:
-        gradient = fitting.undo(gradnet(*seen.gradnet))
-        gradient = gradient * gradient.new_tensor([1.0, stretch_y / stretch_x]).view(1, 2, 1, 1)
-    return Estimate(fitting.undo(seen.regression.disparity) / stretch_x, confidence, gradient)
+    regressions, disparity_right = _regressions(regressor, *views, stretch_x, with_right=confnet is not None)
+    answers = []
+    for regression in regressions:
+        seen = _inputs(regression, disparity_right, confnet, gradnet, *views)
+        confidence = None if confnet is None else confnet.confidence(*seen.confnet)
+        gradient = None if gradnet is None else gradnet(*seen.gradnet)
+        answers.append(Estimate(regression.disparity, confidence, gradient))
+    disparity, confidence, gradient = functools.reduce(surer, answers)
+    if confidence is not None:
+        confidence = fitting.undo(confidence)
+    if gradient is not None:
+        # Disparity and columns are stretched alike, so dx stays as it is; dy comes out sx / sy times too large.
+        gradient = fitting.undo(gradient) * gradient.new_tensor([1.0, stretch_y / stretch_x]).view(1, 2, 1, 1)
+    return Estimate(fitting.undo(disparity) / stretch_x, confidence, gradient)
+
+
+def _regressions(
+    regressor: Regressor, left: Tensor, right: Tensor, stretch: float, with_right: bool
+) -> tuple[list[Regression], Tensor | None]:
+    """A regressor's answers, the finest first, in pixels of the images, and the right view's disparity if wanted."""
+    size = regressor.enlarged_size(*left.shape[-2:])
+    if not with_right:
+        if size is None:
+            return [regress(regressor, left, right, stretch)], None
+        return [regress_enlarged(regressor, left, right, size, stretch)], None
+    own, disparity_right = regress_both(regressor, left, right, stretch)
+    if size is None:
+        return [own], disparity_right
+    up_to = _reach(own.disparity) / stretch
+    return [regress_enlarged(regressor, left, right, size, stretch, up_to), own], disparity_right
+
+
+def _reach(disparity: Tensor) -> float:
+    """How far a second answer is looked for. What few pixels exceed is often wrong, and else the first answer stays."""
+    values = disparity.flatten()
+    reached = values.kthvalue(math.ceil(REACHED_SHARE * values.numel())).values
+    return float(reached) + REACH_MARGIN_PX
 
 
 def surer(first: Estimate, second: Estimate) -> Estimate:

@@ -10,11 +10,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from training.devices import parse_device
+from training.devices import PredictionPrecision, computes_in_bfloat16, parse_device
 from training.errors import TrainingError
 from training.networks import ConfNet, GradNet, Regressor
 from training.networks.cost_features import CostFeatures
-from training.networks.inference import estimate
+from training.networks.inference import Estimate, estimate
 from training.networks.layout import prepare_for_prediction
 from training.networks.regressor_free import RegressorFreeInputs, regressor_free_inputs
 from training.runs.weights import (
@@ -42,7 +42,7 @@ class Prediction:
 class StereoPredictor:
     """The networks of a run folder, ready to predict.
 
-    Images of any size are brought to those that the regressor takes (`Regressor.fittings`), and the outputs back.
+    Images of any size are brought to those that the regressor takes (`Regressor.fitting`), and the outputs back.
     """
 
     def __init__(
@@ -51,6 +51,7 @@ class StereoPredictor:
         device: str = "cpu",
         regressor: str = "regressor",
         max_disparity: int | None = None,
+        precision: PredictionPrecision = "32",
     ) -> None:
         """Read the regressor, and ConfNet and GradNet if the folder has them.
 
@@ -60,6 +61,7 @@ class StereoPredictor:
             regressor: `regressor`, or `regressor_f`. The latter's disparity comes without confidence and gradient,
                 since those networks were trained on the features of `regressor`.
             max_disparity: Largest disparity in pixels to look for; None leaves it to the regressor.
+            precision: Bits of the convolutions. bfloat16 moves disparities by about 0.03 px in the mean.
 
         Raises:
             TrainingError: no regressor, no such device, damaged files, a ConfNet or GradNet trained on another
@@ -67,6 +69,7 @@ class StereoPredictor:
         """
         run = Path(run)
         self._device = parse_device(device)
+        self._bfloat16 = computes_in_bfloat16(precision, self._device)
         stored = load_regressor(run, regressor)
         self._regressor = stored.network.to(self._device)
         if max_disparity is not None:
@@ -94,13 +97,7 @@ class StereoPredictor:
             TrainingError: images of another kind, or of different sizes.
         """
         check_images(left, right)
-        found = estimate(
-            self._regressor,
-            self._confnet,
-            self._gradnet,
-            _as_tensor(left, self._device),
-            _as_tensor(right, self._device),
-        )
+        found = self._estimate(*self.networks, left, right)
         return Prediction(
             disparity=_as_array(found.disparity)[..., 0],
             confidence=None if found.confidence is None else _as_array(found.confidence)[..., 0],
@@ -113,9 +110,20 @@ class StereoPredictor:
         Arguments and errors as for `predict`.
         """
         check_images(left, right)
-        views = (_as_tensor(image[:, ::-1], self._device) for image in (right, left))
-        mirrored = _as_array(estimate(self._regressor, None, None, *views).disparity)[..., 0]
-        return np.ascontiguousarray(mirrored[:, ::-1])
+        found = self._estimate(self._regressor, None, None, right[:, ::-1], left[:, ::-1])
+        return np.ascontiguousarray(_as_array(found.disparity)[:, ::-1, 0])
+
+    def _estimate(
+        self,
+        regressor: Regressor,
+        confnet: ConfNet | None,
+        gradnet: GradNet | None,
+        left: NDArray[np.uint8],
+        right: NDArray[np.uint8],
+    ) -> Estimate:
+        views = (_as_tensor(image, self._device) for image in (left, right))
+        with torch.autocast(self._device.type, torch.bfloat16, enabled=self._bfloat16):
+            return estimate(regressor, confnet, gradnet, *views)
 
 
 class RegressorFreePredictor:

@@ -10,8 +10,9 @@ from training.losses import disparity_smooth_l1, level_cross_entropy
 from training.networks import CostVolumeConfig, CostVolumeNet, DispNetConfig, DispNetCorr1D
 from training.networks.cost_features import CostFeatures
 from training.networks.heads import HeadConfig
-from training.networks.inference import estimate, head_inputs, regress
-from training.networks.regressors.costvolume import CostVolumeObjective
+from training.networks.inference import estimate, head_inputs, regress, regress_enlarged
+from training.networks.regressors.costvolume import CostVolumeObjective, CostVolumeOutput
+from training.networks.regressors.interface import Regression
 from training.networks.regressors.registry import find_regressor, known_regressors, regressor_for
 
 HEIGHT, WIDTH = 64, 128
@@ -139,43 +140,81 @@ def test_large_pictures_are_padded_not_resized(height: int, width: int) -> None:
 @pytest.mark.parametrize(
     ("height", "width", "seen"),
     [
-        (375, 1242, (576, 1888)),  # by 1.5, to about a million pixels
+        (384, 1248, (576, 1856)),  # by 1.48, to about a million pixels
         (96, 160, (192, 320)),  # by 2 at most
-        (375, 450, (768, 928)),
-        (1080, 1920, (1088, 1920)),
+        (384, 480, (768, 960)),
+        (1088, 1920, None),
     ],
 )
-def test_small_pictures_are_enlarged(height: int, width: int, seen: tuple[int, int]) -> None:
-    finest, *others = CostVolumeNet(NARROW).fittings(height, width)
-    assert finest.size == seen
-    assert [each.stretch for each in others] == ([] if finest.stretch == (1.0, 1.0) else [(1.0, 1.0)])
+def test_small_pictures_are_enlarged(height: int, width: int, seen: tuple[int, int] | None) -> None:
+    assert CostVolumeNet(NARROW).enlarged_size(height, width) == seen
 
 
 def test_an_enlarged_pair_gives_disparities_of_its_own_pixels() -> None:
     """The answer is that for the pair enlarged by hand, brought back; it looks as far in the pictures."""
     torch.manual_seed(0)
     network = CostVolumeNet(NARROW).eval()
-    left, right = torch.rand(2, 1, 3, 48, 96)
-    size = (96, 192)
-    larger = [
-        F.interpolate(view, size=size, mode="bicubic", align_corners=False, antialias=True).clamp(0, 1)
-        for view in (left, right)
-    ]
+    left, right = torch.rand(2, 1, 3, 64, 96)
+    larger = enlarged_by_hand(left, right)
     with torch.no_grad():
         seen = network(*larger, disparity_range=128)
-        expected = F.avg_pool2d(F.relu(seen.disparity), 2) / 2
     assert seen.scores.shape[-1] == 128 // 4
     found = estimate(network, None, None, left, right).disparity
-    torch.testing.assert_close(found, expected, rtol=1e-4, atol=1e-4)
+    torch.testing.assert_close(found, F.avg_pool2d(F.relu(seen.disparity), 2) / 2, rtol=1e-4, atol=1e-4)
     network.look_up_to(32)
     with torch.no_grad():
         assert network.see(*larger, stretch=2).scores.shape[-1] == 64 // 4
 
 
+def enlarged_by_hand(left: Tensor, right: Tensor) -> list[Tensor]:
+    """Twice as large."""
+    options = {"scale_factor": 2, "mode": "bicubic", "align_corners": False, "antialias": True}
+    return [F.interpolate(view, **options).clamp(0, 1) for view in (left, right)]  # type: ignore[arg-type]
+
+
+def test_features_of_an_enlarged_pair_hold_disparities_of_its_own_pixels() -> None:
+    """The joined features end in two disparities; all else is that of the enlarged pair, at half its size."""
+    torch.manual_seed(0)
+    network = CostVolumeNet(NARROW).eval()
+    left, right = torch.rand(2, 1, 3, 64, 96)
+    with torch.no_grad():
+        expected = regress(network, *enlarged_by_hand(left, right), stretch=2.0).features
+        found = regress_enlarged(network, left, right, (128, 192), 1.0).features
+    scale = torch.ones(expected["joined"].shape[1], 1, 1)
+    scale[-2:] = 0.5
+    torch.testing.assert_close(found["joined"], F.avg_pool2d(expected["joined"], 2) * scale)
+    torch.testing.assert_close(found["decoded"], F.avg_pool2d(expected["decoded"], 2))
+
+
+def test_the_enlarged_pair_is_searched_as_far_as_its_own_answer_reaches() -> None:
+    torch.manual_seed(0)
+    network = CostVolumeNet(NARROW).eval()
+    ranges = []
+    network.aggregation.register_forward_hook(lambda _, inputs, __: ranges.append(4 * inputs[0].shape[-1]))
+    answers = iter((30.0, 0.0))
+    regression = network.regression
+
+    def answered(output: CostVolumeOutput) -> Regression:
+        found = regression(output)
+        return Regression(torch.full_like(found.disparity, next(answers)), found.features)
+
+    network.regression = answered  # type: ignore[method-assign]
+    left, right = torch.rand(2, 1, 3, 64, 448)
+    found = estimate(network, SureOnTheRight(), None, left, right)  # type: ignore[arg-type]
+    assert ranges == [
+        112 + 16,
+        96,
+    ]  # a quarter of the width; then (30 + 8) px, twice as many in the enlarged pair
+    assert found.disparity.unique().tolist() == [0.0, 30.0]
+
+
 class SureOnTheRight:
-    """Stands for a ConfNet: surer of the picture as it is, but only in its right half."""
+    """Stands for a ConfNet: surer of the second answer it sees, that for the pair as it is, in the right half."""
 
     config = HeadConfig()
+
+    def __init__(self) -> None:
+        self.seen = 0
 
     def inputs(
         self, features: Tensor, consistency: Tensor, cost_features: CostFeatures
@@ -184,9 +223,10 @@ class SureOnTheRight:
         return (consistency,)
 
     def confidence(self, consistency: Tensor) -> Tensor:
+        self.seen += 1
         width = consistency.shape[-1]
         right = torch.arange(width) >= width // 2
-        return torch.where(right & (width == 96), 0.9, 0.5).expand_as(consistency)
+        return torch.where(right & (self.seen == 2), 0.9, 0.5).expand_as(consistency)
 
 
 def test_the_surer_of_two_sizes_answers() -> None:

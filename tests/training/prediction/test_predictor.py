@@ -10,6 +10,7 @@ import safetensors.torch
 import torch
 from torch import Tensor, nn
 
+from training.devices import computes_in_bfloat16
 from training.errors import TrainingError
 from training.networks import (
     ConfNet,
@@ -81,6 +82,30 @@ def test_what_was_saved_predicts_the_same(
     assert read_summary(tmp_path, "regressor") == SUMMARY
 
 
+@pytest.mark.parametrize("network", NARROW)
+def test_bfloat16_moves_the_answer_a_little(
+    network: str, tmp_path: Path, images: tuple[np.ndarray, np.ndarray]
+) -> None:
+    save_run(tmp_path, network)
+    exact = StereoPredictor(tmp_path).predict(*images)
+    got = StereoPredictor(tmp_path, precision="bf16").predict(*images)
+    for name in ("disparity", "confidence", "gradient"):
+        maps, expected = getattr(got, name), getattr(exact, name)
+        assert maps.dtype == np.float32
+        assert 0 < np.abs(maps - expected).mean() < 0.02 * max(np.abs(expected).max(), 1)
+
+
+def test_bfloat16_is_chosen_where_processors_multiply_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for able, expected in (
+        ({"avx512_bf16": True}, True),
+        ({"amx_bf16": True}, True),
+        ({"avx2": True}, False),
+    ):
+        monkeypatch.setattr(torch.cpu, "get_capabilities", lambda able=able: able)
+        assert computes_in_bfloat16("auto", torch.device("cpu")) == expected
+        assert not computes_in_bfloat16("auto", torch.device("cuda"))
+
+
 def test_the_right_view_is_the_left_of_the_mirrored_pair(
     tmp_path: Path, images: tuple[np.ndarray, np.ndarray]
 ) -> None:
@@ -115,14 +140,18 @@ class PlaneOracle(nn.Module):
     def stretch(self, view: Tensor) -> tuple[float, float]:
         return view.shape[-1] / self.size[1], view.shape[-2] / self.size[0]
 
-    def fittings(self, height: int, width: int) -> tuple[Fitting, ...]:
-        return (Resizing(height, width, 64),)
+    def fitting(self, height: int, width: int) -> Fitting:
+        return Resizing(height, width, 64)
+
+    def enlarged_size(self, height: int, width: int) -> None:
+        del height, width
 
     def regression(self, disparity: Tensor) -> Regression:
         features = torch.zeros(1, 1, 2, 2)
         return Regression(disparity, {"joined": features, "decoded": features})
 
-    def see(self, left: Tensor, right: Tensor, stretch: float) -> Tensor:
+    def see(self, left: Tensor, right: Tensor, stretch: float, up_to: float | None) -> Tensor:
+        assert up_to is None
         assert stretch == pytest.approx(self.stretch(left)[0])
         return self(left, right)
 

@@ -31,13 +31,10 @@ from training.networks.cost_volume import (
 from training.networks.initialization import initialize
 from training.networks.regressors.interface import (
     FeatureKind,
-    Fitting,
     Objective,
-    Padding,
     Regression,
     Regressor,
     RegressorConfig,
-    Resizing,
 )
 
 LEAKY_SLOPE = 0.1
@@ -153,8 +150,8 @@ class CostVolumeNet(Regressor):
     """Images of more pixels are searched at half their size, so that time and memory stay in bounds; None searches all
     at their own."""
     enlarged_to_pixels: int | None = 1_050_000
-    """Pictures are enlarged to about so many pixels, by 2 at most, before the network sees them, since it has fewer
-    fine errors then; None enlarges none."""
+    """Pictures are seen enlarged to about so many pixels, by 2 at most, since the network has fewer fine errors then;
+    None enlarges none."""
     strip_rows: int | None = 96
     """Rows that the third look takes at a time where nothing is trained, since its maps at full resolution fit the
     processor's cache then; None takes all at once."""
@@ -178,20 +175,32 @@ class CostVolumeNet(Regressor):
         self.look.begin_without_change()
         self.full_look.begin_without_change()
 
-    def fittings(self, height: int, width: int) -> tuple[Fitting, ...]:
-        """Small pictures are enlarged, for fine errors, and seen as they are for a second opinion.
+    def enlarged_size(self, height: int, width: int) -> tuple[int, int] | None:
+        """Small pictures are enlarged, for fine errors, to multiples of 32.
 
-        The network sees more around a pixel at once then, which tells how far away plain walls are.
+        As they are, the network sees more around a pixel at once, which tells how far away plain walls are.
         """
-        own = Padding(height, width, self.stride)
         if self.enlarged_to_pixels is None or height * width >= self.enlarged_to_pixels:
-            return (own,)
-        enlargement = math.sqrt(self.enlarged_to_pixels / (height * width))
-        return Resizing(height, width, self.stride, min(enlargement, LARGEST_ENLARGEMENT)), own
+            return None
+        enlargement = min(math.sqrt(self.enlarged_to_pixels / (height * width)), LARGEST_ENLARGEMENT)
+        return _whole(height * enlargement, self.stride), _whole(width * enlargement, self.stride)
 
-    def see(self, left: Tensor, right: Tensor, stretch: float) -> CostVolumeOutput:
+    def rescaled(self, regression: Regression, factor: float) -> Regression:
+        """The last two channels of the joined features are disparities: the volume's and the second look's."""
+        joined = regression.features["joined"]
+        features = {
+            **regression.features,
+            "joined": torch.cat([joined[:, :-2], factor * joined[:, -2:]], dim=1),
+        }
+        return Regression(factor * regression.disparity, features)
+
+    def see(
+        self, left: Tensor, right: Tensor, stretch: float, up_to: float | None = None
+    ) -> CostVolumeOutput:
         """What `forward` returns for images that were made `stretch` times wider; it looks as far in the pictures."""
-        disparity_range = self.disparity_range(left.shape[-1] / stretch)
+        disparity_range: float = self.disparity_range(left.shape[-1] / stretch)
+        if up_to is not None:
+            disparity_range = min(disparity_range, up_to)
         return self(left, right, _whole(disparity_range * stretch, self.stride))
 
     def forward(self, left: Tensor, right: Tensor, disparity_range: int | None = None) -> CostVolumeOutput:

@@ -261,9 +261,9 @@ class DispNetCorr1D(Regressor):
         disparity = F.relu(full_resolution(output.disparities[-1], size))
         return Regression(disparity, {"joined": output.features, "decoded": output.decoded})
 
-    def fittings(self, height: int, width: int) -> tuple[Fitting, ...]:
+    def fitting(self, height: int, width: int) -> Fitting:
         """Images are resized to multiples of 64, not padded, as the original network does."""
-        return (Resizing(height, width, self.stride),)
+        return Resizing(height, width, self.stride)
 
     def exportable(self) -> DispNetCorr1D:
         """The network with its correlation as shifted products, whose graph is the same for every image size."""

@@ -6,7 +6,6 @@ A new one is one module in this folder with a `Regressor` subclass; it is found 
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -86,20 +85,37 @@ class Regressor(nn.Module, ABC):
         """The parameters with weight decay: all of them, unless a network overrides this."""
         return self.parameters()
 
-    def fittings(self, height: int, width: int) -> tuple[Fitting, ...]:
-        """How images of any size are brought to sizes that the network takes.
+    def fitting(self, height: int, width: int) -> Fitting:
+        """How images of any size are brought to a size that the network takes."""
+        return Padding(height, width, self.stride)
 
-        The first gives the finest answer. Further ones are for a second opinion, which is asked for where a ConfNet can
-        tell whose is better.
+    def enlarged_size(self, height: int, width: int) -> tuple[int, int] | None:
+        """The (height, width) at which images of a fitting's size are seen a second time, for finer answers.
+
+        None if they are seen once.
         """
-        return (Padding(height, width, self.stride),)
+        del height, width
+        return None
 
-    def see(self, left: Tensor, right: Tensor, stretch: float) -> Any:
-        """What `forward` returns for images (B, 3, H, W) that a fitting made `stretch` times wider.
+    def rescaled(self, regression: Regression, factor: float) -> Regression:
+        """An answer in other pixels: its disparity, and what features hold of it, multiplied by a factor.
+
+        A network that sees images enlarged overrides this, since it knows its features.
+        """
+        del factor
+        return regression
+
+    def see(self, left: Tensor, right: Tensor, stretch: float, up_to: float | None = None) -> Any:
+        """What `forward` returns for whole pictures.
 
         A network that looks for disparities up to so many pixels of the pictures overrides this.
+
+        Args:
+            left, right: (B, 3, H, W) in 0..1, made `stretch` times wider than the pictures.
+            stretch: See above.
+            up_to: Pixels of the pictures beyond which the network need not look; None if that is not known.
         """
-        del stretch
+        del stretch, up_to
         return self(left, right)
 
     def look_up_to(self, max_disparity: int) -> None:
@@ -187,18 +203,7 @@ class Resizing(Fitting):
     Examples:
         >>> Resizing(375, 1242, 64).size
         (384, 1280)
-        >>> Resizing(375, 1242, 32, enlargement=1.5).size
-        (576, 1888)
     """
-
-    enlargement: float = 1.0
-    """How many times larger the images become before their sizes become multiples."""
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(height, width) that the network sees: the next multiples of the stride."""
-        height, width = (math.ceil(length * self.enlargement) for length in (self.height, self.width))
-        return _next_multiple(height, self.stride), _next_multiple(width, self.stride)
 
     @property
     def stretch(self) -> tuple[float, float]:
@@ -207,13 +212,12 @@ class Resizing(Fitting):
         return width / self.width, height / self.height
 
     def apply(self, image: Tensor) -> Tensor:
-        """Resize an image (B, C, H, W), bicubically if it is enlarged, which keeps it sharp."""
-        mode = "bilinear" if self.enlargement == 1 else "bicubic"
-        return resize(image, *self.size, mode).clamp(0, 1)
+        """Resize an image (B, C, H, W)."""
+        return resize(image, *self.size)
 
     def undo(self, maps: Tensor) -> Tensor:
-        """Resize maps back, without smoothing, which would mix disparities of two surfaces."""
-        return resize(maps, self.height, self.width, antialias=self.enlargement == 1)
+        """Resize maps back."""
+        return resize(maps, self.height, self.width)
 
 
 def _next_multiple(length: int, stride: int) -> int:
