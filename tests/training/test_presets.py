@@ -17,7 +17,6 @@ from training.networks import (
     left_right_consistency,
     predict_right,
 )
-from training.networks.inference import regress
 from training.networks.regressors.dispnet import MultiscaleObjective
 from training.networks.regressors.registry import known_regressors, regressor_for
 from training.presets import (
@@ -147,7 +146,7 @@ def test_full_heads_see_the_features_and_the_mirrored_consistency() -> None:
     (image, features, consistency), disparity = confnet.head_inputs(batch)
     assert (image.shape[1], features.shape[1], consistency.shape[1]) == (3, 97, 1)
     with torch.no_grad():
-        mirrored = predict_right(lambda a, b: regress(regressor, a, b).disparity, left, right)
+        mirrored = predict_right(lambda a, b: regressor.regress(a, b).disparity, left, right)
     torch.testing.assert_close(consistency, left_right_consistency(disparity, mirrored))
     assert confnet.network.joined_input(image, features, consistency).shape == (1, 101, 64, 128)
     inputs, _ = gradnet.head_inputs(batch)

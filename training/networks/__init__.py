@@ -21,10 +21,11 @@ Examples:
 
 from training.networks.confnet import ConfNet
 from training.networks.correlation import Correlation1D, correlate_1d
+from training.networks.cost_volume_layers import CostVolumeConfig
 from training.networks.gradnet import PUBLISHED_GRADNET, GradNet
 from training.networks.heads import HeadConfig
 from training.networks.lrc import left_right_consistency, predict_right
-from training.networks.regressors.costvolume import CostVolumeConfig, CostVolumeNet
+from training.networks.regressors.costvolume import CostVolumeNet
 from training.networks.regressors.dispnet import (
     DispNetConfig,
     DispNetCorr1D,

@@ -50,47 +50,6 @@ class Estimate(NamedTuple):
     """(B, 2, H, W) px per pixel, [dx, dy]."""
 
 
-def regress(
-    regressor: Regressor,
-    left: Tensor,
-    right: Tensor,
-    stretch: float | None = None,
-    up_to: float | None = None,
-) -> Regression:
-    """Predict the left view's disparity.
-
-    Args:
-        regressor: The network.
-        left, right: (B, 3, H, W) in 0..1, H and W multiples of the network's stride.
-        stretch: How many times wider than whole pictures these are. Disparities are in pixels of `left`; how far the
-            network looks is in those of the pictures. None for crops, in which `forward` decides.
-        up_to: Pixels of the pictures beyond which it need not look, if it can look less far; None for no such limit.
-
-    Examples:
-        >>> from training.networks import DispNetConfig, DispNetCorr1D
-        >>> regressor = DispNetCorr1D(DispNetConfig(width=0.0625)).eval()
-        >>> regress(regressor, *torch.rand(2, 1, 3, 64, 64)).disparity.shape
-        torch.Size([1, 1, 64, 64])
-    """
-    output = regressor(left, right) if stretch is None else regressor.see(left, right, stretch, up_to)
-    return regressor.regression(output)
-
-
-def regress_both(
-    regressor: Regressor, left: Tensor, right: Tensor, stretch: float | None = None
-) -> tuple[Regression, Tensor]:
-    """Predict the left view's disparity, and the right view's (B, 1, H, W), in one forward pass.
-
-    The right view's is that of the swapped views, mirrored (`predict_right`), in the same batch. Arguments as for
-    `regress`.
-    """
-    batch = left.shape[0]
-    views = torch.cat([left, right.flip(-1)]), torch.cat([right, left.flip(-1)])
-    both = regress(regressor, *views, stretch)
-    features = {kind: maps[:batch] for kind, maps in both.features.items()}
-    return Regression(both.disparity[:batch], features), both.disparity[batch:].flip(-1)
-
-
 def regress_enlarged(
     regressor: Regressor,
     left: Tensor,
@@ -99,18 +58,18 @@ def regress_enlarged(
     stretch: float,
     up_to: float | None = None,
 ) -> Regression:
-    """What `regress` says of the images enlarged, brought back: in pixels, and of the size, of the images.
+    """What `Regressor.regress` says of the images enlarged, brought back: in pixels, and of the size, of the images.
 
     Args:
         regressor: The network.
         left, right: (B, 3, H, W) in 0..1.
         size: (height, width) that they are enlarged to, bicubically, which keeps them sharp.
-        stretch, up_to: As for `regress`.
+        stretch, up_to: As for `Regressor.regress`.
     """
     height, width = left.shape[-2:]
     factor = size[1] / width
     larger, other = (resize(view, *size, mode="bicubic").clamp(0, 1) for view in (left, right))
-    found = regressor.rescaled(regress(regressor, larger, other, stretch * factor, up_to), 1 / factor)
+    found = regressor.rescaled(regressor.regress(larger, other, stretch * factor, up_to), 1 / factor)
     # Not smoothed, which would mix disparities of two surfaces.
     disparity = resize(found.disparity, height, width, antialias=False)
     features = {
@@ -130,8 +89,8 @@ def head_inputs(
         left, right: (B, 3, H, W) in 0..1, H and W multiples of the regressor's stride.
     """
     if confnet is None:
-        return _inputs(regress(regressor, left, right), None, confnet, gradnet, left, right)
-    return _inputs(*regress_both(regressor, left, right), confnet, gradnet, left, right)
+        return _inputs(regressor.regress(left, right), None, confnet, gradnet, left, right)
+    return _inputs(*regressor.both(left, right), confnet, gradnet, left, right)
 
 
 def _inputs(
@@ -202,9 +161,9 @@ def _regressions(
     size = regressor.enlarged_size(*left.shape[-2:])
     if not with_right:
         if size is None:
-            return [regress(regressor, left, right, stretch)], None
+            return [regressor.regress(left, right, stretch)], None
         return [regress_enlarged(regressor, left, right, size, stretch)], None
-    own, disparity_right = regress_both(regressor, left, right, stretch)
+    own, disparity_right = regressor.both(left, right, stretch)
     if size is None:
         return [own], disparity_right
     up_to = _reach(own.disparity) / stretch

@@ -14,7 +14,7 @@ from training.errors import TrainingError
 from training.losses import gradient_aware_l1
 from training.metrics import bad_pixel_rate, end_point_error, forward_gradient, gradient_error
 from training.networks import Regressor
-from training.networks.inference import estimate, regress
+from training.networks.inference import estimate
 from training.presets import DisparityPreset, FineTuningPreset, RegressorPreset
 from training.tasks.base import StereoTask, image_of, map_of
 
@@ -99,7 +99,7 @@ class FineTuningTask(_DisparityTask):
 
     def loss(self, batch: StereoBatch) -> Tensor:
         """`gradient_aware_l1` of a batch."""
-        prediction = regress(self.network, batch.left, batch.right).disparity
+        prediction = self.network.regress(batch.left, batch.right).disparity
         return gradient_aware_l1(prediction, batch.disparity, self.gradient_weight)
 
 

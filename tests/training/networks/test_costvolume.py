@@ -10,7 +10,7 @@ from training.losses import disparity_smooth_l1, level_cross_entropy
 from training.networks import CostVolumeConfig, CostVolumeNet, DispNetConfig, DispNetCorr1D
 from training.networks.cost_features import CostFeatures
 from training.networks.heads import HeadConfig
-from training.networks.inference import estimate, head_inputs, regress, regress_enlarged
+from training.networks.inference import estimate, head_inputs, regress_enlarged
 from training.networks.regressors.costvolume import CostVolumeObjective, CostVolumeOutput
 from training.networks.regressors.interface import Regression
 from training.networks.regressors.registry import find_regressor, known_regressors, regressor_for
@@ -132,7 +132,7 @@ def test_large_pictures_are_padded_not_resized(height: int, width: int) -> None:
     columns = torch.arange(-(-width // 32) * 32).clamp(max=width - 1)
     with torch.no_grad():
         views = left[:, :, rows][..., columns], right[:, :, rows][..., columns]
-        whole = regress(network, *views, stretch=1.0).disparity
+        whole = network.regress(*views, stretch=1.0).disparity
     found = estimate(network, None, None, left, right).disparity
     torch.testing.assert_close(found, whole[..., :height, :width])
 
@@ -162,8 +162,35 @@ def test_an_enlarged_pair_gives_disparities_of_its_own_pixels() -> None:
     found = estimate(network, None, None, left, right).disparity
     torch.testing.assert_close(found, F.avg_pool2d(F.relu(seen.disparity), 2) / 2, rtol=1e-4, atol=1e-4)
     network.look_up_to(32)
+    assert searched(network, *larger, stretch=2.0) == [64]
+
+
+def searched(network: CostVolumeNet, left: Tensor, right: Tensor, stretch: float | None) -> list[int]:
+    """How far `regress` searches each volume, in pixels."""
+    ranges = []
+    handle = network.aggregation.register_forward_hook(
+        lambda _, inputs, __: ranges.append(4 * inputs[0].shape[-1])
+    )
     with torch.no_grad():
-        assert network.see(*larger, stretch=2).scores.shape[-1] == 64 // 4
+        network.regress(left, right, stretch)
+    handle.remove()
+    return ranges
+
+
+def test_the_right_views_disparity_is_the_volumes_of_the_mirrored_pair() -> None:
+    torch.manual_seed(0)
+    network = CostVolumeNet(NARROW).eval()
+    left, right = torch.rand(2, 2, 3, 32, 96)
+    with torch.no_grad():
+        found, disparity_right = network.both(left, right)
+        alone = network.regress(left, right)
+        mirrored = network(right.flip(-1), left.flip(-1)).coarse.flip(-1)
+    torch.testing.assert_close(found.disparity, alone.disparity)
+    torch.testing.assert_close(dict(found.features), dict(alone.features))
+    assert disparity_right.shape == mirrored.shape
+    # One is interpolated from half resolution, the other upsampled by learnt weights, untrained here.
+    means = [F.avg_pool2d(maps, 8).flatten() for maps in (disparity_right, F.relu(mirrored))]
+    assert torch.corrcoef(torch.stack(means))[0, 1] > 0.9
 
 
 def enlarged_by_hand(left: Tensor, right: Tensor) -> list[Tensor]:
@@ -178,7 +205,7 @@ def test_features_of_an_enlarged_pair_hold_disparities_of_its_own_pixels() -> No
     network = CostVolumeNet(NARROW).eval()
     left, right = torch.rand(2, 1, 3, 64, 96)
     with torch.no_grad():
-        expected = regress(network, *enlarged_by_hand(left, right), stretch=2.0).features
+        expected = network.regress(*enlarged_by_hand(left, right), stretch=2.0).features
         found = regress_enlarged(network, left, right, (128, 192), 1.0).features
     scale = torch.ones(expected["joined"].shape[1], 1, 1)
     scale[-2:] = 0.5
@@ -254,7 +281,7 @@ def test_heads_are_trained_on_crops_searched_as_far_as_the_regressors() -> None:
     with torch.no_grad():
         network(left, right)
         head_inputs(network, None, None, left, right)
-        regress(network, left, right, stretch=1.0)
+        network.regress(left, right, stretch=1.0)
     assert ranges == [160, 160, 96]
 
 
@@ -369,5 +396,5 @@ def test_it_learns_a_shift() -> None:
         errors = []
         for _ in range(5):
             left, right, truth = batch()
-            errors.append((regress(network, left, right).disparity - truth)[..., 40:].abs() < 1)
+            errors.append((network.regress(left, right).disparity - truth)[..., 40:].abs() < 1)
     assert torch.stack(errors).float().mean() > 0.8

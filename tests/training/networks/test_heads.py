@@ -25,7 +25,7 @@ from training.networks.cost_features import (
     CostFeatures,
     smooth_slopes,
 )
-from training.networks.inference import head_inputs, regress, regress_both
+from training.networks.inference import head_inputs
 from training.networks.regressors.dispnet import FeatureKind
 
 
@@ -150,9 +150,9 @@ def test_one_pass_gives_both_views() -> None:
     regressor = DispNetCorr1D(DispNetConfig(width=0.0625)).eval()
     left, right = torch.rand(2, 2, 3, 64, 64)
     with torch.no_grad():
-        regression, disparity_right = regress_both(regressor, left, right)
-        alone = regress(regressor, left, right)
-        mirrored = predict_right(lambda a, b: regress(regressor, a, b).disparity, left, right)
+        regression, disparity_right = regressor.both(left, right)
+        alone = regressor.regress(left, right)
+        mirrored = predict_right(lambda a, b: regressor.regress(a, b).disparity, left, right)
     torch.testing.assert_close(regression.disparity, alone.disparity)
     torch.testing.assert_close(dict(regression.features), dict(alone.features))
     torch.testing.assert_close(disparity_right, mirrored)

@@ -146,14 +146,10 @@ class PlaneOracle(nn.Module):
     def enlarged_size(self, height: int, width: int) -> None:
         del height, width
 
-    def regression(self, disparity: Tensor) -> Regression:
-        features = torch.zeros(1, 1, 2, 2)
-        return Regression(disparity, {"joined": features, "decoded": features})
-
-    def see(self, left: Tensor, right: Tensor, stretch: float, up_to: float | None) -> Tensor:
-        assert up_to is None
+    def regress(self, left: Tensor, right: Tensor, stretch: float) -> Regression:
         assert stretch == pytest.approx(self.stretch(left)[0])
-        return self(left, right)
+        features = torch.zeros(1, 1, 2, 2)
+        return Regression(self(left, right), {"joined": features, "decoded": features})
 
     def forward(self, left: Tensor, right: Tensor) -> Tensor:  # noqa: ARG002
         self.seen.append(tuple(left.shape))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import torch
@@ -23,10 +22,20 @@ from training.networks.cost_volume import (
     NEIGHBOURS,
     convex_upsample,
     cosine_volume,
-    expected_shift,
     normalized_groups,
     read_out,
-    windowed_cosines,
+)
+from training.networks.cost_volume_layers import (
+    LEAKY_SLOPE,
+    Aggregation,
+    CostVolumeConfig,
+    Descriptors,
+    SecondLook,
+    ThirdLook,
+    Views,
+    convolved,
+    doubled,
+    first_pairs,
 )
 from training.networks.initialization import initialize
 from training.networks.regressors.interface import (
@@ -34,47 +43,18 @@ from training.networks.regressors.interface import (
     Objective,
     Regression,
     Regressor,
-    RegressorConfig,
+    resize,
+    with_mirrored,
 )
 
-LEAKY_SLOPE = 0.1
-"""Slope of LeakyReLU below zero."""
 CELL = 4
 """Full-resolution pixels in a pixel of the volume, each way, and in one of its levels."""
-CERTAINTY_CHANNELS = 3
-"""Channels of the certainty in `Readout`."""
 LARGEST_DISPARITY_PX = 192
 """Disparities below this are looked for in images of ordinary size, as the field does."""
 LARGEST_ENLARGEMENT = 2.0
 """Of small pictures."""
 READOUT_REACH = 2
 """Levels on either side of the best that the read-out's expectation is taken over."""
-
-
-@dataclass(frozen=True)
-class CostVolumeConfig(RegressorConfig):
-    """Options of the network. The defaults are the preset `small` (640,000 parameters)."""
-
-    stem: int = 16
-    """Channels at 1/2."""
-    encoder: tuple[int, int, int, int] = (32, 48, 64, 64)
-    """Channels at 1/4, 1/8, 1/16 and 1/32."""
-    descriptor_groups: int = 4
-    """Groups of the descriptor at 1/4, each of which gives one volume of cosines."""
-    group_channels: int = 8
-    """Channels of a group, at every resolution."""
-    aggregation: tuple[int, int, int, int] = (8, 16, 32, 32)
-    """Channels of the 3-D convolutions at 1/4, 1/8, 1/16 and 1/32."""
-    look_groups: int = 2
-    """Groups of the descriptor at 1/2."""
-    look_reach: int = 3
-    """Half-resolution pixels on either side of the volume's disparity that the second look compares."""
-    look_channels: int = 32
-    """Channels of the second look."""
-    full_reach: int = 2
-    """Pixels on either side of the second look's disparity that the third look compares."""
-    full_channels: int = 16
-    """Channels of the third look."""
 
 
 class CostVolumeOutput(NamedTuple):
@@ -163,7 +143,7 @@ class CostVolumeNet(Regressor):
         super().__init__(config)
         self.descriptors = Descriptors(config)
         self.aggregation = Aggregation(config)
-        self.half_weights = nn.Sequential(_convolved(config.encoder[0], 32), nn.Conv2d(32, NEIGHBOURS * 4, 1))
+        self.half_weights = nn.Sequential(convolved(config.encoder[0], 32), nn.Conv2d(32, NEIGHBOURS * 4, 1))
         self.look = SecondLook(config)
         self.full_look = ThirdLook(config)
         self.feature_channels: dict[FeatureKind, int] = {
@@ -194,14 +174,22 @@ class CostVolumeNet(Regressor):
         }
         return Regression(factor * regression.disparity, features)
 
-    def see(
-        self, left: Tensor, right: Tensor, stretch: float, up_to: float | None = None
-    ) -> CostVolumeOutput:
-        """What `forward` returns for images that were made `stretch` times wider; it looks as far in the pictures."""
-        disparity_range: float = self.disparity_range(left.shape[-1] / stretch)
-        if up_to is not None:
-            disparity_range = min(disparity_range, up_to)
-        return self(left, right, _whole(disparity_range * stretch, self.stride))
+    def regress(
+        self, left: Tensor, right: Tensor, stretch: float | None = None, up_to: float | None = None
+    ) -> Regression:
+        """As `Regressor.regress`; disparities are looked for as far as `disparity_range` and `up_to` say."""
+        return self.regression(self(left, right, self._range_of(left, stretch, up_to)))
+
+    def both(self, left: Tensor, right: Tensor, stretch: float | None = None) -> tuple[Regression, Tensor]:
+        """As `Regressor.both`, but the right view's disparity is the volume's, which is fine enough to compare."""
+        images, views, matched = self._search(
+            *with_mirrored(left, right), self._range_of(left, stretch, None)
+        )
+        batch = left.shape[0]
+        output = self._look(first_pairs(images, batch), views.first(batch), matched.first(batch))
+        right_half = 2 * matched.disparity[batch:].flip(-1)
+        height, width = left.shape[-2:]
+        return self.regression(output), resize(F.relu(right_half), height, width, antialias=False)
 
     def forward(self, left: Tensor, right: Tensor, disparity_range: int | None = None) -> CostVolumeOutput:
         """Predict the left view's disparity.
@@ -214,10 +202,17 @@ class CostVolumeNet(Regressor):
         Raises:
             ValueError: the images differ in size, or a size is no multiple of 32.
         """
+        return self._look(*self._search(left, right, disparity_range or self._range_of_crops(left.shape[-1])))
+
+    def _search(self, left: Tensor, right: Tensor, disparity_range: int) -> tuple[Tensor, Views, Matched]:
+        """Both views, mean 0, what they are compared by, and what the volume says."""
         self.check_images(left, right)
         images = torch.cat([left, right]) - self.image_mean.view(1, 3, 1, 1)
         views = self.descriptors(images)
-        matched = self._match(images, views, disparity_range or self._range_of_crops(left.shape[-1]))
+        return images, views, self._match(images, views, disparity_range)
+
+    def _look(self, images: Tensor, views: Views, matched: Matched) -> CostVolumeOutput:
+        """The second and the third look."""
         coarse, half = matched.disparity, views.half.chunk(2)
         context = views.context.chunk(2)[0]
         seen = self.look(half[0], half[1], context, coarse.detach(), matched.certainty)
@@ -245,7 +240,7 @@ class CostVolumeNet(Regressor):
             coarse, certainty = (
                 maps[..., : size[0], : size[1]] for maps in (below.disparity, below.certainty)
             )
-            return Matched(below.scores, convex_upsample(2 * coarse, weights, 2), _doubled(certainty))
+            return Matched(below.scores, convex_upsample(2 * coarse, weights, 2), doubled(certainty))
         left, right = (
             normalized_groups(view, self.config.descriptor_groups) for view in views.quarter.chunk(2)
         )
@@ -253,7 +248,7 @@ class CostVolumeNet(Regressor):
         readout = read_out(scores, READOUT_REACH)
         # At 1/2, disparities are counted in pixels of that resolution.
         coarse = convex_upsample(readout.disparity * (CELL / 2), weights, 2)
-        return Matched(scores, coarse, _doubled(readout.certainty))
+        return Matched(scores, coarse, doubled(readout.certainty))
 
     def look_up_to(self, max_disparity: int) -> None:
         """Look for disparities from 0 to this many pixels. That changes no weights.
@@ -290,6 +285,15 @@ class CostVolumeNet(Regressor):
         wanted = max(64, min(width / 4, LARGEST_DISPARITY_PX), width / 8)
         return min(_whole(wanted, self.stride), _whole(width, self.stride))
 
+    def _range_of(self, left: Tensor, stretch: float | None, up_to: float | None) -> int:
+        """How far `regress` looks in images, in their pixels."""
+        if stretch is None:
+            return self._range_of_crops(left.shape[-1])
+        disparity_range: float = self.disparity_range(left.shape[-1] / stretch)
+        if up_to is not None:
+            disparity_range = min(disparity_range, up_to)
+        return _whole(disparity_range * stretch, self.stride)
+
     def _range_of_crops(self, width: int) -> int:
         """How far `forward` looks in images of a width if nothing is said."""
         if self.max_disparity is not None:
@@ -302,82 +306,6 @@ class CostVolumeNet(Regressor):
         return Regression(F.relu(output.disparity), features)
 
 
-class Views(NamedTuple):
-    """What both views are compared by; the left ones first in the batch."""
-
-    quarter: Tensor
-    """(2B, C, H/4, W/4) descriptors."""
-    half: Tensor
-    """(2B, C, H/2, W/2) descriptors."""
-    context: Tensor
-    """(2B, 24, H/2, W/2) features for upsampling and the second look."""
-    guides: tuple[Tensor, ...]
-    """Features at 1/4, 1/8, 1/16 and 1/32, which gate the volume."""
-
-
-class Descriptors(nn.Module):
-    """Features of one view: an encoder to 1/32, a decoder to 1/4, and descriptors at 1/4 and 1/2."""
-
-    CONTEXT = 24
-    """Channels of `Views.context`."""
-
-    def __init__(self, config: CostVolumeConfig) -> None:
-        super().__init__()
-        c2, encoder = config.stem, config.encoder
-        c4 = encoder[0]
-        self.stem = nn.Sequential(_convolved(3, c2, stride=2), _convolved(c2, c2))
-        self.down = nn.ModuleList(
-            nn.Sequential(_convolved(above, here, stride=2), Residual(here))
-            for above, here in pairwise((c2, *encoder))
-        )
-        self.up = nn.ModuleList(_convolved(below + here, here) for here, below in pairwise(encoder))
-        self.describe_quarter = nn.Conv2d(c4, config.descriptor_groups * config.group_channels, 1)
-        self.context = _convolved(c2 + c4, self.CONTEXT)
-        self.describe_half = nn.Conv2d(self.CONTEXT, config.look_groups * config.group_channels, 1)
-
-    def forward(self, views: Tensor) -> Views:
-        """Describe views (2B, 3, H, W)."""
-        at2 = maps = self.stem(views)
-        scales = [maps := down(maps) for down in self.down]
-        for scale in reversed(range(len(self.up))):
-            scales[scale] = self.up[scale](torch.cat([_doubled(scales[scale + 1]), scales[scale]], dim=1))
-        context = self.context(torch.cat([at2, _doubled(scales[0])], dim=1))
-        return Views(self.describe_quarter(scales[0]), self.describe_half(context), context, tuple(scales))
-
-
-class Aggregation(nn.Module):
-    """A 3-D hourglass over rows, columns and levels, gated at each scale by the left view's features."""
-
-    def __init__(self, config: CostVolumeConfig) -> None:
-        super().__init__()
-        channels = config.aggregation
-        self.enter = nn.ModuleList([_convolved3d(config.descriptor_groups, channels[0])])
-        for above, here in pairwise(channels):
-            self.enter.append(nn.Sequential(_convolved3d(above, here, stride=2), _convolved3d(here, here)))
-        self.gate = nn.ModuleList(
-            nn.Conv2d(guide, here, 1) for guide, here in zip(config.encoder, channels, strict=True)
-        )
-        self.narrow = nn.ModuleList(nn.Conv3d(below, here, 1) for here, below in pairwise(channels))
-        self.leave = nn.ModuleList(_convolved3d(here, here) for here in channels[:-1])
-        self.score = nn.Conv3d(channels[0], 1, 1)
-
-    def forward(self, volume: Tensor, guides: list[Tensor]) -> Tensor:
-        """Scores (B, h, w, D) of a volume (B, G, h, w, D); h, w and D are multiples of 8.
-
-        Args:
-            volume: The cosines.
-            guides: The left view's features at 1/4, 1/8, 1/16 and 1/32.
-        """
-        maps, scales = volume, []
-        for enter, gate, guide in zip(self.enter, self.gate, guides, strict=True):
-            maps = enter(maps) * torch.sigmoid(gate(guide))[..., None]
-            scales.append(maps)
-        for scale in reversed(range(len(self.leave))):
-            maps = self.leave[scale](scales[scale] + _doubled(self.narrow[scale](maps)))
-        scores: Tensor = self.score(maps)[:, 0]
-        return scores.float()
-
-
 class Matched(NamedTuple):
     """What the volume says, at 1/2 of the resolution."""
 
@@ -388,163 +316,9 @@ class Matched(NamedTuple):
     certainty: Tensor
     """(B, 3, H/2, W/2), as in `Readout`."""
 
-
-class LookOutput(NamedTuple):
-    """What the second look says, at 1/2 of the resolution."""
-
-    disparity: Tensor
-    """(B, 1, h, w) in pixels of this resolution."""
-    weights: Tensor
-    """(B, 36, h, w), for `convex_upsample` to full resolution."""
-    inputs: Tensor
-    """(B, F, h, w): what it decided from."""
-    features: Tensor
-    """(B, F, h, w): its last features."""
-
-
-class SecondLook(nn.Module):
-    """Compares the views at 1/2 around the volume's disparity, where half a pixel can be seen."""
-
-    def __init__(self, config: CostVolumeConfig) -> None:
-        super().__init__()
-        self.groups, self.reach = config.look_groups, config.look_reach
-        offsets = 2 * config.look_reach + 1
-        channels = config.look_channels
-        self.input_channels = (
-            config.look_groups * (offsets + config.group_channels)
-            + Descriptors.CONTEXT
-            + CERTAINTY_CHANNELS
-            + 1
-        )
-        self.layers = nn.Sequential(
-            _convolved(self.input_channels, channels),
-            Residual(channels),
-            _convolved(channels, channels, dilation=2),
-            Residual(channels),
-            _convolved(channels, channels, dilation=4),
-            Residual(channels),
-        )
-        self.decide = nn.Conv2d(channels, offsets + 1, 3, 1, 1)
-        self.weights = nn.Sequential(_convolved(Descriptors.CONTEXT, 32), nn.Conv2d(32, NEIGHBOURS * 4, 1))
-
-    def begin_without_change(self) -> None:
-        """Set the weights of the decision to 0, so that the volume's disparity stays as it is."""
-        nn.init.zeros_(self.decide.weight)
-
-    def forward(
-        self, left: Tensor, right: Tensor, context: Tensor, disparity: Tensor, certainty: Tensor
-    ) -> LookOutput:
-        """Look again.
-
-        Args:
-            left, right: (B, C, h, w) descriptors.
-            context: (B, 24, h, w) features of the left view.
-            disparity: (B, 1, h, w) of the volume, in pixels of this resolution.
-            certainty: (B, 3, h, w) of the volume.
-        """
-        grouped = [normalized_groups(view, self.groups) for view in (left, right)]
-        products = windowed_cosines(grouped[0], grouped[1], disparity, self.reach)
-        scaled = disparity / 32  # of the size of the other inputs
-        inputs = torch.cat([products, left, context, certainty, scaled], dim=1)
-        features = self.layers(inputs)
-        decision = self.decide(features).float()
-        looked = disparity + expected_shift(decision, self.reach)
-        return LookOutput(looked, self.weights(context).float(), inputs, features)
-
-
-class ThirdLook(nn.Module):
-    """Compares the views once more, at full resolution around the second look's disparity."""
-
-    SEES_ROWS = 8
-    """Rows above and below a pixel that its shift depends on, an even number."""
-
-    def __init__(self, config: CostVolumeConfig) -> None:
-        super().__init__()
-        self.reach, channels = config.full_reach, config.full_channels
-        offsets = 2 * config.full_reach + 1
-        self.narrow = nn.Conv2d(Descriptors.CONTEXT, channels, 1)
-        self.stem = _convolved(3, channels)
-        self.join = _convolved(channels, channels)
-        self.describe = nn.Conv2d(channels, config.group_channels, 1)
-        self.layers = nn.Sequential(
-            _convolved(offsets + config.group_channels + channels + 1, channels),
-            Residual(channels),
-            _convolved(channels, channels, dilation=2),
-        )
-        self.decide = nn.Conv2d(channels, offsets + 1, 3, 1, 1)
-
-    def begin_without_change(self) -> None:
-        """Set the weights of the decision to 0, so that the second look's disparity stays as it is."""
-        nn.init.zeros_(self.decide.weight)
-
-    def in_strips(self, images: Tensor, context: Tensor, disparity: Tensor, rows: int | None) -> Tensor:
-        """`forward`, on so many rows at a time and those around them that they see; all at once if None."""
-        height = disparity.shape[-2]
-        if rows is None or height <= rows:
-            shift: Tensor = self(images, context, disparity)
-            return shift
-        strips = []
-        for top in range(0, height, rows):
-            first, last = max(top - self.SEES_ROWS, 0), min(top + rows + self.SEES_ROWS, height)
-            half = context[:, :, first // 2 : last // 2]
-            strip = self(images[:, :, first:last], half, disparity[:, :, first:last])
-            strips.append(strip[:, :, top - first : top - first + rows])
-        return torch.cat(strips, dim=2)
-
-    def forward(self, images: Tensor, context: Tensor, disparity: Tensor) -> Tensor:
-        """What the second look's disparity should be changed by, (B, 1, H, W) px.
-
-        Args:
-            images: (2B, 3, H, W), the left ones first, mean 0.
-            context: (2B, 24, H/2, W/2) features of both views.
-            disparity: (B, 1, H, W) px after the second look.
-        """
-        features = self.join(self.stem(images) + _doubled(self.narrow(context)))
-        described = self.describe(features).chunk(2)
-        left, right = (normalized_groups(view, 1) for view in described)
-        products = windowed_cosines(left, right, disparity, self.reach)
-        scaled = disparity / 64  # of the size of the other inputs
-        inputs = [products, described[0], features.chunk(2)[0], scaled]
-        decision = self.decide(self.layers(torch.cat(inputs, dim=1))).float()
-        return expected_shift(decision, self.reach)
-
-
-class Residual(nn.Module):
-    """Two 3x3 convolutions, added to their input."""
-
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        self.first = _convolved(channels, channels)
-        self.second = nn.Sequential(
-            nn.Conv2d(channels, channels, 3, 1, 1, bias=False), nn.BatchNorm2d(channels)
-        )
-
-    def forward(self, maps: Tensor) -> Tensor:
-        """Of the same shape."""
-        return F.leaky_relu(maps + self.second(self.first(maps)), LEAKY_SLOPE)
-
-
-def _convolved(in_channels: int, channels: int, stride: int = 1, dilation: int = 1) -> nn.Sequential:
-    """A 3x3 convolution, BatchNorm and LeakyReLU."""
-    return nn.Sequential(
-        nn.Conv2d(in_channels, channels, 3, stride, dilation, dilation, bias=False),
-        nn.BatchNorm2d(channels),
-        nn.LeakyReLU(LEAKY_SLOPE, inplace=True),
-    )
-
-
-def _convolved3d(in_channels: int, channels: int, stride: int = 1) -> nn.Sequential:
-    """A 3x3x3 convolution, BatchNorm and LeakyReLU."""
-    return nn.Sequential(
-        nn.Conv3d(in_channels, channels, 3, stride, 1, bias=False),
-        nn.BatchNorm3d(channels),
-        nn.LeakyReLU(LEAKY_SLOPE, inplace=True),
-    )
-
-
-def _doubled(maps: Tensor) -> Tensor:
-    """Every pixel, and every level of a volume, twice each way."""
-    return F.interpolate(maps, scale_factor=2.0, mode="nearest")
+    def first(self, batch: int) -> Matched:
+        """That of the batch's first pairs."""
+        return Matched(*(maps[:batch] for maps in self))
 
 
 def _whole(length: float, unit: int) -> int:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, NamedTuple
 
+import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
@@ -105,18 +106,39 @@ class Regressor(nn.Module, ABC):
         del factor
         return regression
 
-    def see(self, left: Tensor, right: Tensor, stretch: float, up_to: float | None = None) -> Any:
-        """What `forward` returns for whole pictures.
+    def regress(
+        self, left: Tensor, right: Tensor, stretch: float | None = None, up_to: float | None = None
+    ) -> Regression:
+        """Predict the left view's disparity, in pixels of the images.
 
-        A network that looks for disparities up to so many pixels of the pictures overrides this.
+        A network that can look less far overrides this and `both`.
 
         Args:
-            left, right: (B, 3, H, W) in 0..1, made `stretch` times wider than the pictures.
-            stretch: See above.
+            left, right: (B, 3, H, W) in 0..1, H and W multiples of the stride.
+            stretch: How many times wider than whole pictures these are, in whose pixels it is counted how far the
+                network looks. None for crops, in which `forward` decides.
             up_to: Pixels of the pictures beyond which the network need not look; None if that is not known.
+
+        Examples:
+            >>> import torch
+            >>> from training.networks import DispNetConfig, DispNetCorr1D
+            >>> regressor = DispNetCorr1D(DispNetConfig(width=0.0625)).eval()
+            >>> regressor.regress(*torch.rand(2, 1, 3, 64, 64)).disparity.shape
+            torch.Size([1, 1, 64, 64])
         """
         del stretch, up_to
-        return self(left, right)
+        return self.regression(self(left, right))
+
+    def both(self, left: Tensor, right: Tensor, stretch: float | None = None) -> tuple[Regression, Tensor]:
+        """Predict the left view's disparity, and the right view's (B, 1, H, W), to compare them.
+
+        The right view's is that of the swapped views, mirrored (`training.networks.lrc.predict_right`), in the same
+        batch. Arguments as for `regress`.
+        """
+        found = self.regress(*with_mirrored(left, right), stretch)
+        batch = left.shape[0]
+        features = {kind: maps[:batch] for kind, maps in found.features.items()}
+        return Regression(found.disparity[:batch], features), found.disparity[batch:].flip(-1)
 
     def look_up_to(self, max_disparity: int) -> None:
         """Look for disparities from 0 to this many pixels, instead of what the network chooses by itself.
@@ -218,6 +240,11 @@ class Resizing(Fitting):
     def undo(self, maps: Tensor) -> Tensor:
         """Resize maps back."""
         return resize(maps, self.height, self.width)
+
+
+def with_mirrored(left: Tensor, right: Tensor) -> tuple[Tensor, Tensor]:
+    """Pairs (B, 3, H, W), and after them the same with views swapped and mirrored, which are rectified pairs, too."""
+    return torch.cat([left, right.flip(-1)]), torch.cat([right, left.flip(-1)])
 
 
 def _next_multiple(length: int, stride: int) -> int:
