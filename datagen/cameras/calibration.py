@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
-from scenes.spec import Rig
 from stereoforge_kit.errors import InputError
+
+if TYPE_CHECKING:
+    from scenes.spec import Rig
 
 FOCAL_TOLERANCE = 1e-4
 """Relative difference of focal lengths up to which two views are of one rectified pair."""
@@ -50,6 +52,9 @@ class Calibration:
 
         Raises ValueError for a size of another shape, and for none at all.
         """
+        # Here, since worlds load scipy's splines: a third of a second that depth from a calibration can do without.
+        from scenes.spec import Rig
+
         wanted = size or self.size
         if wanted is None:
             raise InputError("the file does not say how large the images are, so --size has to")

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from datagen.errors import FormatError
@@ -23,7 +22,7 @@ def write_point_cloud(path: Path | str, points: NDArray[np.floating[Any]], color
 
     Raises FormatError for arrays of other shapes, no points, or points that are not finite.
 
-    >>> import tempfile
+    >>> import tempfile, trimesh
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "points.ply"
     ...     write_point_cloud(path, np.array([[0, 0, 5.0]]), np.uint8([[9, 8, 7]]))
@@ -38,5 +37,7 @@ def write_point_cloud(path: Path | str, points: NDArray[np.floating[Any]], color
         raise FormatError(f"{path}: {len(points)} points have as many colours, not {colors.shape}")
     if not np.isfinite(points).all():
         raise FormatError(f"{path}: points must be finite")
+    import trimesh  # here, since refining without a calibration writes no points
+
     cloud = trimesh.PointCloud(points.astype(np.float32), colors=colors)
     write_bytes(path, cloud.export(file_type="ply"))
