@@ -88,7 +88,8 @@ class MethodPool:
     everywhere: GradientPool
     d1: D1Pool
     seconds: float = 0.0
-    frames: int = 0
+    timed: int = 0
+    """Frames that `seconds` are of."""
 
     @classmethod
     def empty(cls, bad_threshold: float, gradient_threshold: float) -> MethodPool:
@@ -112,7 +113,11 @@ class MethodPool:
         self.masked.add(gradient, truth, smooth_mask(truth, self.gradient_threshold))
         self.everywhere.add(gradient, truth)
         self.seconds += seconds
-        self.frames += 1
+        self.timed += 1
+
+    def forget_seconds(self) -> None:
+        """Count the time of later frames only."""
+        self.seconds, self.timed = 0.0, 0
 
     def merge(self, other: MethodPool) -> None:
         """Add the sums of another pool."""
@@ -122,7 +127,7 @@ class MethodPool:
         self.everywhere.merge(other.everywhere)
         self.d1.merge(other.d1)
         self.seconds += other.seconds
-        self.frames += other.frames
+        self.timed += other.timed
 
     def score(self) -> MethodScore:
         """The measures; NaN for those without a pixel."""
@@ -134,7 +139,7 @@ class MethodPool:
             gradient_masked=self.masked.gradient_error,
             gradient_all=self.everywhere.gradient_error,
             d1=self.d1.rates,
-            seconds=self.seconds / max(self.frames, 1),
+            seconds=self.seconds / max(self.timed, 1),
         )
 
     def fractions(self) -> dict[str, NDArray[np.float64]]:

@@ -5,13 +5,17 @@ takes the parameters in turn: it moves along a parameter's values, up and else d
 and goes round again until a whole round gains next to nothing. Two that make up for one another (`Method.tied`) are
 moved together too: alone neither can leave a valley that runs aslant. That finds the best of all combinations only
 where the parameters act apart, but tries some tens of settings where the whole grid has thousands.
+
+Most settings are worse than the best so far, and a part of the frames tells. So frames come in stages
+(`stages_of`), and a setting that is clearly behind after one is given up, as in successive halving (Jamieson and
+Talwalkar, AISTATS 2016).
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Literal
@@ -27,6 +31,11 @@ ROUNDS = 10
 """At most so many rounds over the parameters. After three, the first had not felt where the last went."""
 LEAST_GAIN = 1e-3
 """A round that lowers the objective by less than this is the last."""
+FEWEST_STAGED = 8
+"""Fewer frames are one stage: a quarter of them would not tell settings apart."""
+CLEARLY_BEHIND = 0.02
+"""A setting is given up where its objective exceeds the best one's by more than this share of it after the same
+frames."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +55,7 @@ class Trial:
     setting: Mapping[str, Any]
     """Values of the searched parameters, by their paths."""
     objective: float
+    """Infinite where a ratio is not defined, and where it was given up (`Race`)."""
 
 
 @dataclass(frozen=True)
@@ -77,17 +87,70 @@ class TunedMethod:
 
 def measure(method: Method, frames: Iterable[EvaluationFrame], bad_threshold: float = 1.0) -> Errors:
     """Run a method that gives disparities on every frame and pool its errors."""
+    return next(measure_in_stages(method, (frames,), bad_threshold))
+
+
+def measure_in_stages(
+    method: Method, stages: Iterable[Iterable[EvaluationFrame]], bad_threshold: float = 1.0
+) -> Iterator[Errors]:
+    """Run a method that gives disparities on frames, and give after each stage the errors on all frames so far."""
     errors, gradients = ErrorPool(bad_threshold), GradientPool()
-    for frame in frames:
-        disparity = method.run(frame).disparity
-        if disparity is None:
-            raise InputError(
-                f"{method.name} gives no disparity, so its parameters cannot be validated by one"
-            )
-        truth = forward_gradient(frame.truth)
-        errors.add(disparity, frame.truth)
-        gradients.add(forward_gradient(disparity), truth, smooth_mask(truth))
-    return Errors(errors.bad_pixel_rate, errors.end_point_error, gradients.gradient_error)
+    for frames in stages:
+        for frame in frames:
+            disparity = method.run(frame).disparity
+            if disparity is None:
+                raise InputError(
+                    f"{method.name} gives no disparity, so its parameters cannot be validated by one"
+                )
+            truth = forward_gradient(frame.truth)
+            errors.add(disparity, frame.truth)
+            gradients.add(forward_gradient(disparity), truth, smooth_mask(truth))
+        yield Errors(errors.bad_pixel_rate, errors.end_point_error, gradients.gradient_error)
+
+
+def stages_of(frames: Sequence[EvaluationFrame]) -> tuple[Sequence[EvaluationFrame], ...]:
+    """A quarter of the frames, another quarter, and the rest, each spread evenly; all at once where they are few.
+
+    Examples:
+        >>> stages_of(range(10))
+        (range(0, 10, 4), range(2, 10, 4), range(1, 10, 2))
+    """
+    if len(frames) < FEWEST_STAGED:
+        return (frames,)
+    return frames[::4], frames[2::4], frames[1::2]
+
+
+class Race:
+    """The objective of a method's settings on frames, against the best so far.
+
+    Args:
+        frames: What they are measured on.
+        initial: Errors of the initial disparity after each stage of the frames.
+        objective: Which of the errors.
+    """
+
+    def __init__(
+        self, frames: Sequence[EvaluationFrame], initial: Sequence[Errors], objective: Objective
+    ) -> None:
+        self.stages, self.initial, self.objective = stages_of(frames), initial, objective
+        self.best: list[float] = []
+        """The best setting's objective after each stage."""
+
+    def __call__(self, method: Method) -> float:
+        """The objective of a setting; infinite where it is given up."""
+        found: list[float] = []
+        for errors, initial in zip(measure_in_stages(method, self.stages), self.initial, strict=True):
+            found.append(objective_of(errors, initial, self.objective))
+            if self.best and found[-1] > (1 + CLEARLY_BEHIND) * self.best[len(found) - 1]:
+                return math.inf
+        if not self.best or found[-1] < self.best[-1]:
+            self.best = found
+        return found[-1]
+
+    def against(self, method: Method) -> None:
+        """Race against a setting whose objective is known, but not after each stage."""
+        if len(self.stages) > 1:
+            self(method)
 
 
 def objective_of(errors: Errors, initial: Errors, objective: Objective) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,10 +19,11 @@ from refine.evaluation.settings import Settings, read_settings, write_settings
 from refine.evaluation.tuning import (
     Errors,
     Objective,
+    Race,
     Trial,
     TunedMethod,
-    measure,
-    objective_of,
+    measure_in_stages,
+    stages_of,
     tune_method,
     usual_trials,
     value_at,
@@ -42,14 +43,24 @@ class _Search:
     """The search of one method: first its defaults, which tell how long a trial takes, then all others."""
 
     kind: type[Method]
-    frames: Sequence[EvaluationFrame]
-    score: Callable[[Errors], float]
+    race: Race
     trials: list[Trial]
     """Those that are known, which are not repeated."""
     remember: Callable[[Sequence[Trial]], None]
     """Called with all trials after each."""
-    trial_seconds: float = 0.0
-    """What the latest trial took, or would have without compiling."""
+    seconds: list[float] = field(default_factory=list)
+    """What each new trial took; the first one may have waited for a compiler."""
+
+    def __post_init__(self) -> None:
+        """Race against the best known trial."""
+        if self.trials:
+            self.race.against(TunedMethod.best_of(self.kind, self.trials).method)
+
+    @property
+    def trial_seconds(self) -> float:
+        """What a trial takes; 0 where none was made."""
+        counted = self.seconds[1:] or self.seconds
+        return sum(counted) / len(counted) if counted else 0.0
 
     @property
     def trials_left(self) -> int:
@@ -78,17 +89,9 @@ class _Search:
         self.remember(self.trials)
 
     def _evaluate(self, method: Method) -> float:
-        began: list[float] = []
-
-        def timed() -> Iterator[EvaluationFrame]:
-            for frame in self.frames:
-                began.append(time.perf_counter())
-                yield frame
-
-        value = self.score(measure(method, timed()))
-        # The first frame is left out where there are others: it may have waited for a compiler.
-        since = began[min(1, len(began) - 1)]
-        self.trial_seconds = (time.perf_counter() - since) * len(began) / max(len(began) - 1, 1)
+        began = time.perf_counter()
+        value = self.race(method)
+        self.seconds.append(time.perf_counter() - began)
         return value
 
 
@@ -119,7 +122,7 @@ class Tuning:
             name: TunedMethod(method, earlier.trials.get(name, ()))
             for name, method in earlier.methods.items()
         }
-        initial = measure(known_methods()["regressor"](), self.frames)
+        initial = tuple(measure_in_stages(known_methods()["regressor"](), stages_of(self.frames)))
         searches = [self._search(kind, initial, earlier.trials.get(kind.name, ())) for kind in kinds]
         with progress_bar() as progress:
             bar = progress.add_task("tuning", total=sum(usual_trials(kind) for kind in kinds))
@@ -146,15 +149,12 @@ class Tuning:
         write_settings(self.out, self.tuned, self.about)
         return self.tuned
 
-    def _search(self, kind: type[Method], initial: Errors, known: Sequence[Trial]) -> _Search:
+    def _search(self, kind: type[Method], initial: Sequence[Errors], known: Sequence[Trial]) -> _Search:
         def remember(trials: Sequence[Trial]) -> None:
             self.tuned[kind.name] = TunedMethod.best_of(kind, trials)
             write_settings(self.out, self.tuned, {**self.about, "whole": False})
 
-        def score(errors: Errors) -> float:
-            return objective_of(errors, initial, self.objective)
-
-        return _Search(kind, self.frames, score, list(known), remember)
+        return _Search(kind, Race(self.frames, initial, self.objective), list(known), remember)
 
     def _follow(self) -> None:
         """Give methods that hold another one its parameters."""

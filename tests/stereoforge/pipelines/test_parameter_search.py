@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -10,10 +11,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import stereoforge.pipelines.parameter_search as tuning
+import refine.evaluation.tuning as tuning
 from datagen import DatasetError
 from datagen.sources.registry import DataSource, SourceFormat
 from refine.evaluation.settings import read_settings
+from refine.evaluation.tuning import Race
+from refine.methods.ours import Ours
 from stereoforge.errors import CommandError
 from stereoforge.pipelines.parameter_search import Tuning, describe, validation_frames
 from stereoforge.pipelines.prediction import network_digests
@@ -35,16 +38,16 @@ def test_an_interrupted_search_ends_as_an_uninterrupted_one(tmp_path, monkeypatc
     whole = search(tmp_path / "whole.json").run(names)
     assert whole["ours_conf_gt"].method.mrf == whole["ours"].method
 
-    measure, calls = tuning.measure, 0
+    trial, calls = Race.__call__, 0
 
-    def interrupted(method, frames):
+    def interrupted(race, method):
         nonlocal calls
         calls += 1
-        if calls == 14:
+        if calls == 13:
             raise KeyboardInterrupt
-        return measure(method, frames)
+        return trial(race, method)
 
-    monkeypatch.setattr(tuning, "measure", interrupted)
+    monkeypatch.setattr(Race, "__call__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         search(tmp_path / "part.json").run(names)
     part = read_settings(tmp_path / "part.json")
@@ -53,8 +56,7 @@ def test_an_interrupted_search_ends_as_an_uninterrupted_one(tmp_path, monkeypatc
     search(tmp_path / "part.json").run(names)
     assert (tmp_path / "part.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
     trials = sum(len(result.trials) for result in whole.values())
-    # Two runs, each of which measured the initial disparity, one trial that was interrupted, and no trial twice.
-    assert calls == trials + 2 + 1
+    assert calls == trials + 1  # one trial was interrupted, and none made twice
 
 
 def test_another_set_of_frames_starts_anew_and_another_method_joins(tmp_path):
@@ -120,3 +122,34 @@ def test_a_search_says_how_long_it_takes_before_it_does_and_what_is_left(tmp_pat
         trials = len(found[name].trials)
         assert re.fullmatch(rf"{name}: \d\.\d+ to \d\.\d+ in {trials} trials(; about \d+ \w+ left)?", line)
         assert (not last) == line.endswith(" left")
+
+
+def test_a_search_in_stages_ends_near_one_that_gives_nothing_up(tmp_path, monkeypatch):
+    """And is interrupted and resumed like any other."""
+    frames = [toy_frame(seed, 32, 48) for seed in range(9)]
+    frames = [replace(frame, confidence=frame.confidence.clip(0, 1)) for frame in frames]
+    runs, run = 0, Ours.run
+
+    def counted(method, frame):
+        nonlocal runs
+        runs += 1
+        return run(method, frame)
+
+    monkeypatch.setattr(Ours, "run", counted)
+    staged = search(tmp_path / "staged.json", frames).run(("ours",))["ours"]
+    staged_runs, runs = runs, 0
+    assert any(trial.objective == float("inf") for trial in staged.trials)
+    monkeypatch.setattr(Ours, "run", run)
+
+    text = (tmp_path / "staged.json").read_bytes()
+    document = json.loads(text)
+    document["trials"]["ours"] = document["trials"]["ours"][:9]
+    (tmp_path / "part.json").write_text(json.dumps(document))
+    search(tmp_path / "part.json", frames).run(("ours",))
+    assert (tmp_path / "part.json").read_bytes() == text
+
+    monkeypatch.setattr(Ours, "run", counted)
+    monkeypatch.setattr(tuning, "CLEARLY_BEHIND", float("inf"))
+    whole = search(tmp_path / "whole.json", frames).run(("ours",))["ours"]
+    assert staged.objective < 1.1 * whole.objective < 0.1 * whole.default_objective
+    assert staged_runs < 0.9 * runs
