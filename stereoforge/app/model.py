@@ -15,6 +15,10 @@ MOST_POINTS = 150_000
 """What a browser without a graphics card turns smoothly."""
 FARTHEST = 4.0
 """Times the median distance; what lies behind would make everything else small."""
+FEW = 0.01
+"""Share of the points on either side, along each axis, that may lie apart from the others."""
+APART = 0.25
+"""Lengths of the others beyond which they do; the viewer would look at the middle between them and the others."""
 
 
 def write_model(path: Path, points: NDArray[np.floating[Any]], colors: NDArray[np.uint8]) -> None:
@@ -26,7 +30,10 @@ def write_model(path: Path, points: NDArray[np.floating[Any]], colors: NDArray[n
         colors: (N, 3) uint8 sRGB.
     """
     near = points[:, 2] <= FARTHEST * np.median(points[:, 2])
-    shown, shades = points[near], colors[near]
-    step = -(-len(shown) // MOST_POINTS)
-    cloud = trimesh.PointCloud((shown[::step] * (1, -1, -1)).astype(np.float32), colors=shades[::step])
+    first, last = np.quantile(points[near], (FEW, 1 - FEW), axis=0)
+    margin = APART * (last - first)
+    shown = near & ((points >= first - margin) & (points <= last + margin)).all(axis=1)
+    points, colors = points[shown], colors[shown]
+    step = -(-len(points) // MOST_POINTS)
+    cloud = trimesh.PointCloud((points[::step] * (1, -1, -1)).astype(np.float32), colors=colors[::step])
     write_bytes(path, trimesh.Scene(cloud).export(file_type="glb"))

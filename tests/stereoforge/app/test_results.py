@@ -71,6 +71,15 @@ def test_files(found: Found, tmp_path: Path) -> None:
     assert cloud.vertices[:, 2].max() < 0
 
 
+def test_what_lies_apart_is_not_shown(tmp_path: Path) -> None:
+    """The viewer looks at the middle of all it is given."""
+    room = np.random.default_rng(0).uniform((-1, -1, 4), (1, 1, 6), (5000, 3))
+    apart = np.array([(-9.0, 0, 5), (0, -4, 5), (0, 0, 1.5), (0, 0, 90)])
+    write_model(tmp_path / "points.glb", np.vstack([apart, room]), np.zeros((5004, 3), np.uint8))
+    (cloud,) = trimesh.load(tmp_path / "points.glb").geometry.values()
+    np.testing.assert_allclose(np.unique(cloud.vertices), np.unique((room * (1, -1, -1)).astype(np.float32)))
+
+
 @pytest.mark.parametrize(
     ("numbers", "sentence"),
     [
