@@ -137,18 +137,18 @@ class GradNetPreset(Preset):
 
 @dataclass(frozen=True, kw_only=True)
 class RegressorFreeConfNetPreset(ConfNetPreset):
-    """ConfNet on the disparity of semi-global matching, without a regressor (ours)."""
+    """ConfNet on disparities from anywhere, without a regressor's features (ours)."""
 
     matcher: SGBMParameters = field(default_factory=SGBMParameters)
-    """Options of the matcher, which matches every crop and every validation frame during the run."""
+    """Options of the matcher, which matches crops and validation frames during the run."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RegressorFreeGradNetPreset(GradNetPreset):
-    """GradNet on the disparity of semi-global matching, without a regressor (ours)."""
+    """GradNet on disparities from anywhere, without a regressor's features (ours)."""
 
     matcher: SGBMParameters = field(default_factory=SGBMParameters)
-    """Options of the matcher, which matches every crop and every validation frame during the run."""
+    """Options of the matcher, which matches crops and validation frames during the run."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,9 +45,10 @@ class Train:
         shown("TASK"),
     ]
     """regressor: the network that predicts disparity. regressor_f: a regressor fine-tuned on gradients too. confnet,
-    gradnet: the heads on a regressor. confnet_free, gradnet_free: regressor-free heads, trained on semi-global
-    matching, for the disparity of any predictor. rdf: a random forest, the rival of ConfNet. joint: trains confnet and
-    gradnet of --init further, through the refinement, into another run folder."""
+    gradnet: the heads on a regressor. confnet_free, gradnet_free: regressor-free heads, for the disparity of any
+    predictor, trained on semi-global matching and, with --init, on that regressor's disparity. rdf: a random forest,
+    the rival of ConfNet. joint: trains confnet and gradnet of --init further, through the refinement, into another run
+    folder."""
     data: Annotated[tuple[str, ...], several("DATA[:WEIGHT]")]
     """Data sets, each with how often it is drawn from relative to the others (default 1): folders or URLs, with
     FORMAT: in front where the folder does not tell, #0-99 behind for a part."""

@@ -91,7 +91,9 @@ def _with_networks(plan: RunPlan, module: StereoDataModule) -> BuiltTask:
         network = _regressor_to_train(preset, module, plan.request.init)
         return BuiltTask(RegressorTask(preset, network, steps, seed), None)
     if isinstance(preset, RegressorFreeConfNetPreset | RegressorFreeGradNetPreset):
-        free_task = _regressor_free_task(preset, steps, seed)
+        init = plan.request.init
+        judged = None if init is None else load_regressor(init).network
+        free_task = _regressor_free_task(preset, judged, steps, seed)
         _calibrate(free_task, module)
         return BuiltTask(free_task, None)
     regressor = load_regressor(_regressor_folder(plan))
@@ -115,11 +117,14 @@ def _head_task(
 
 
 def _regressor_free_task(
-    preset: RegressorFreeConfNetPreset | RegressorFreeGradNetPreset, steps: int, seed: int
+    preset: RegressorFreeConfNetPreset | RegressorFreeGradNetPreset,
+    regressor: Regressor | None,
+    steps: int,
+    seed: int,
 ) -> RegressorFreeConfNetTask | RegressorFreeGradNetTask:
     if isinstance(preset, RegressorFreeConfNetPreset):
-        return RegressorFreeConfNetTask(preset, ConfNet(preset.network), steps, seed)
-    return RegressorFreeGradNetTask(preset, GradNet(preset.network), steps, seed)
+        return RegressorFreeConfNetTask(preset, regressor, ConfNet(preset.network), steps, seed)
+    return RegressorFreeGradNetTask(preset, regressor, GradNet(preset.network), steps, seed)
 
 
 def _joint_task(plan: RunPlan, preset: JointPreset, regressor: StoredNetwork[Regressor]) -> JointTask:

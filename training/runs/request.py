@@ -21,7 +21,7 @@ from training.presets import (
     find_preset,
 )
 from training.runs.hardware import Precision, process_count, trainer_options
-from training.runs.weights import has_weights
+from training.runs.weights import has_weights, load_regressor
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,8 @@ class RunPlan:
     """Optimizer steps."""
     refinement: Ours | None
     """What `joint` trains through; None for the other tasks."""
+    judged: str | None
+    """Digest of the regressor whose disparities regressor-free heads learn from too; None for other tasks."""
     trainer_options: Mapping[str, Any]
     """Device, precision and processes in Lightning's words."""
 
@@ -112,6 +114,7 @@ class RunPlan:
             "precision": request.precision,
             "processes": process_count(),
             "refinement": None if self.refinement is None else asdict(self.refinement),
+            "judged": self.judged,
         }
 
 
@@ -133,7 +136,8 @@ def plan_run(request: TrainingRequest) -> RunPlan:
         raise TrainingError(f"a run needs at least one step, got {steps}")
     _require_regressor(request, preset)
     options = trainer_options(request.device, request.precision)
-    return RunPlan(request, preset, name, steps, _refinement_of(request, preset), options)
+    refinement, judged = _refinement_of(request, preset), _judged_by_free_heads(request, preset)
+    return RunPlan(request, preset, name, steps, refinement, judged, options)
 
 
 def _changed_preset(request: TrainingRequest) -> tuple[Preset, str]:
@@ -147,7 +151,15 @@ def _changed_preset(request: TrainingRequest) -> tuple[Preset, str]:
         name += " with " + ", ".join(f"{field} {value}" for field, value in request.changes.items())
     if request.pseudo_labels is not None:
         name += f", pseudo labels from {_pseudo_labels(request)}"
+    if isinstance(preset, RegressorFreeConfNetPreset | RegressorFreeGradNetPreset) and request.init:
+        name += f", half on the disparity of {request.init}"
     return preset, name
+
+
+def _judged_by_free_heads(request: TrainingRequest, preset: Preset) -> str | None:
+    """Digest of the regressor that regressor-free heads are given."""
+    free = isinstance(preset, RegressorFreeConfNetPreset | RegressorFreeGradNetPreset)
+    return load_regressor(request.init).sha256 if free and request.init is not None else None
 
 
 def _refinement_of(request: TrainingRequest, preset: Preset) -> Ours | None:
@@ -169,7 +181,7 @@ def _require_regressor(request: TrainingRequest, preset: Preset) -> None:
     out, init = request.out, request.init
     if isinstance(preset, JointPreset) and (init is None or init.resolve() == out.resolve()):
         raise TrainingError("joint starts from another run folder's networks: name it as init (--init)")
-    if isinstance(preset, RegressorFreeConfNetPreset | RegressorFreeGradNetPreset):
+    if isinstance(preset, RegressorFreeConfNetPreset | RegressorFreeGradNetPreset) and init is None:
         return
     if isinstance(preset, RegressorPreset) and init is None:
         if preset.frozen:

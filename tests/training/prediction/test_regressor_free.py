@@ -13,7 +13,10 @@ from refine.metrics import optimal_auc, sparsification_curve
 from stereoforge_kit.matching import SGBMParameters, fill_background, left_right_consistency, match_both
 from tests.training.running import train_quietly
 from tests.training.synthetic import NO_AUGMENTATION, random_layer, random_pair, render, write_dataset
+from training.data.batch import StereoBatch
 from training.errors import TrainingError
+from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, predict_right
+from training.networks.lrc import left_right_consistency as lrc
 from training.networks.regressor_free import (
     REGRESSOR_FREE_CHANNELS,
     disparity_features,
@@ -22,8 +25,10 @@ from training.networks.regressor_free import (
 )
 from training.prediction.predictor import RegressorFreePredictor
 from training.presets import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset, find_preset
-from training.runs.weights import load_confnet
+from training.runs.weights import TrainingSummary, load_confnet, read_summary, save_weights
+from training.tasks.regressor_free import RegressorFreeConfNetTask
 
+SUMMARY = TrainingSummary("tiny", 1, 0, (("set", 1.0),), best_step=1)
 MATCHER = SGBMParameters(max_disparity_px=48)
 
 
@@ -146,3 +151,45 @@ def test_networks_are_optional_and_checked(run: Path, tmp_path: Path) -> None:
     (tmp_path / "confnet_free.json").write_bytes((run / "gradnet_free.json").read_bytes())
     with pytest.raises(TrainingError, match="describes a gradnet_free"):
         load_confnet(tmp_path, "confnet_free")
+
+
+def test_half_of_the_crops_carry_a_regressors_disparity() -> None:
+    torch.manual_seed(0)
+    regressor = DispNetCorr1D(DispNetConfig(width=0.0625))
+    preset = quick("confnet_free")
+    assert isinstance(preset, RegressorFreeConfNetPreset)
+    task = RegressorFreeConfNetTask(preset, regressor, ConfNet(preset.network), 10, 0).train()
+    assert not regressor.training
+    left, right = torch.rand(2, 3, 3, 64, 128)
+    truth = torch.zeros(3, 1, 64, 128)
+    initial = task.initial_disparities(StereoBatch(left, right, truth, truth.repeat(1, 2, 1, 1)))
+    matched = match_batch(left[:2], right[:2], MATCHER)
+    for given, expected in zip(initial, matched, strict=True):
+        torch.testing.assert_close(given[:2], expected)
+    with torch.no_grad():
+        predicted = regressor.regress(left[2:], right[2:]).disparity
+        mirrored = predict_right(lambda a, b: regressor.regress(a, b).disparity, left[2:], right[2:])
+    torch.testing.assert_close(initial.disparity[2:], predicted)
+    assert (initial.known[2:] == 1).all()
+    torch.testing.assert_close(initial.consistency[2:], lrc(predicted, mirrored))
+
+
+def test_a_run_on_a_regressor_says_so_and_keeps_to_it(tmp_path: Path) -> None:
+    data = write_dataset(tmp_path / "set", 0, train=2, val=1)
+    for seed in (0, 1):
+        torch.manual_seed(seed)
+        save_weights(
+            tmp_path / f"init{seed}", "regressor", DispNetCorr1D(DispNetConfig(width=0.0625)), SUMMARY
+        )
+    options = {"steps": 2, "init": tmp_path / "init0"}
+    train_quietly("confnet_free", [(data, 1.0)], tmp_path / "run", quick("confnet_free"), **options)
+    said = read_summary(tmp_path / "run", "confnet_free").preset
+    assert said.endswith(f"half on the disparity of {tmp_path / 'init0'}")
+    assert not (tmp_path / "run" / "regressor.safetensors").exists()
+    options |= {"resume": True, "steps": 4, "init": tmp_path / "init1"}
+    with pytest.raises(TrainingError, match="judged"):
+        train_quietly("confnet_free", [(data, 1.0)], tmp_path / "run", quick("confnet_free"), **options)
+    with pytest.raises(TrainingError, match="holds no trained regressor"):
+        train_quietly(
+            "gradnet_free", [(data, 1.0)], tmp_path / "run", quick("gradnet_free"), init=tmp_path / "none"
+        )
