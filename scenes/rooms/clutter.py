@@ -10,22 +10,14 @@ import numpy as np
 from scenes.random_draws import chance, choose, integer, uniform
 from scenes.rooms.config import IndoorConfig
 from scenes.rooms.interior import Interior, Placed
-from scenes.shapes.indoor.fixtures import Lamp
-from scenes.shapes.indoor.objects import (
-    Basket,
-    BookRow,
-    BookStack,
-    Carton,
-    FruitBowl,
-    Laptop,
-    Package,
-    PottedPlant,
-    Tool,
-    Toy,
-    Vessel,
-)
+from scenes.shapes.indoor.books import BookRow, BookStack
+from scenes.shapes.indoor.containers import Basket, Carton, Package
+from scenes.shapes.indoor.devices import Laptop
+from scenes.shapes.indoor.lamps import Lamp
+from scenes.shapes.indoor.objects import PottedPlant, Tool, Toy
 from scenes.shapes.indoor.parts import IndoorShape, Top
 from scenes.shapes.indoor.storage import Rack, Shelf
+from scenes.shapes.indoor.vessels import FruitBowl, Vessel
 
 Sampler = Callable[[np.random.Generator], IndoorShape]
 

@@ -11,10 +11,20 @@ import numpy as np
 from scenes.random_draws import chance, choose, integer, uniform
 from scenes.rooms.config import IndoorConfig
 from scenes.rooms.interior import Extent, Interior, Placed, extent_of
-from scenes.shapes.indoor import fixtures, objects, seating, storage, tables
-from scenes.shapes.indoor.fixtures import Railing, Stairs
+from scenes.shapes.indoor import (
+    containers,
+    devices,
+    fixtures,
+    lamps,
+    objects,
+    seating,
+    stairs,
+    storage,
+    tables,
+)
 from scenes.shapes.indoor.parts import IndoorShape
 from scenes.shapes.indoor.shell import Pillar, RoomSlab
+from scenes.shapes.indoor.stairs import Railing, Stairs
 
 Furnish = Callable[[np.random.Generator, Interior], object]
 _IN_FRONT = 0.04
@@ -131,7 +141,7 @@ def _television(rng: np.random.Generator, interior: Interior) -> None:
     board = interior.try_at_wall(rng, "sideboard", storage.Cabinet.sideboard(rng), tries=20)
     if board is None or not board.shape.tops():
         return
-    interior.try_on(rng, "television", objects.Screen.television(rng), board, board.shape.tops()[0], yaw=0.0)
+    interior.try_on(rng, "television", devices.Screen.television(rng), board, board.shape.tops()[0], yaw=0.0)
 
 
 def _desk(rng: np.random.Generator, interior: Interior) -> None:
@@ -142,7 +152,7 @@ def _desk(rng: np.random.Generator, interior: Interior) -> None:
     (top,) = shape.tops()
     middle = uniform(rng, -0.15, 0.15)
     for k in range(choose(rng, [1, 1, 2])):
-        screen = objects.Screen.sample(rng)
+        screen = devices.Screen.sample(rng)
         x, y = interior.to_world(desk, middle + k * 0.72 - 0.1, 0.2)
         place = (x, y, top.z)
         extent = extent_of(screen, place, desk.yaw)
@@ -150,7 +160,7 @@ def _desk(rng: np.random.Generator, interior: Interior) -> None:
         if inside and interior.meets_none(extent, desk):
             interior.put(rng, "screen", screen, place, desk.yaw, base=desk)
     keys = interior.to_world(desk, middle - 0.1, shape.depth - 0.2)
-    interior.put(rng, "keyboard", objects.Keyboard.sample(rng), (*keys, top.z), desk.yaw, base=desk)
+    interior.put(rng, "keyboard", devices.Keyboard.sample(rng), (*keys, top.z), desk.yaw, base=desk)
     seat = interior.to_world(desk, middle, shape.depth + uniform(rng, 0.1, 0.5))
     chair = seating.OfficeChair.sample(rng) if chance(rng, 0.75) else seating.Chair.sample(rng)
     interior.try_near(rng, "chair", chair, seat, desk.yaw + math.pi + rng.normal(0.0, 0.4), besides=desk)
@@ -168,7 +178,7 @@ def _bed(rng: np.random.Generator, interior: Interior) -> None:
         spot = interior.to_world(bed, side * (bed.shape.width / 2 + 0.3), 0.01)
         stand = interior.try_near(rng, "sideboard", table, spot, bed.yaw)
         if stand is not None and chance(rng, 0.7):
-            interior.try_on(rng, "lamp", fixtures.Lamp.table(rng), stand, table.tops()[0], yaw=0.0)
+            interior.try_on(rng, "lamp", lamps.Lamp.table(rng), stand, table.tops()[0], yaw=0.0)
 
 
 def _kitchen_row(rng: np.random.Generator, interior: Interior) -> None:
@@ -205,7 +215,7 @@ def _bookshelves(rng: np.random.Generator, interior: Interior) -> None:
 
 def _ceiling_lamps(rng: np.random.Generator, interior: Interior) -> None:
     """One lamp in the middle, or a row or grid of equal ones in a large room."""
-    lamp, plan = fixtures.CeilingLamp.sample(rng), interior.plan
+    lamp, plan = lamps.CeilingLamp.sample(rng), interior.plan
     large = plan.kind in ("office", "workshop", "corridor", "store room") or lamp.form in ("tube", "panel")
     spacing = uniform(rng, 1.8, 2.6) if large else 9.0
     columns, rows = max(1, round(plan.width / spacing)), max(1, round(plan.depth / spacing))
@@ -274,7 +284,7 @@ _sideboard = _at_wall("sideboard", storage.Cabinet.sideboard)
 _wardrobe = _at_wall("wardrobe", storage.Cabinet.wardrobe)
 _rack = _at_wall("rack", storage.Rack.sample)
 _plant = _free("plant", objects.PottedPlant.sample)
-_floor_lamp = _free("lamp", fixtures.Lamp.floor)
+_floor_lamp = _free("lamp", lamps.Lamp.floor)
 _chair = _free("chair", seating.Chair.sample)
 _stool = _free("stool", seating.Stool.sample)
 _armchair = _free(
@@ -285,11 +295,11 @@ _armchair = _free(
 )
 _table = _free("table", tables.Table.low)
 _bench_table = _free("table", tables.Table.dining)
-_carton = _free("carton", objects.Carton.sample)
-_basket = _free("basket", objects.Basket.sample)
+_carton = _free("carton", containers.Carton.sample)
+_basket = _free("basket", containers.Basket.sample)
 _toy = _free("toy", objects.Toy.sample)
 _reel = _free("tool", objects.Tool.sample)
-_free_railing = _free("railing", fixtures.Railing.sample)
+_free_railing = _free("railing", stairs.Railing.sample)
 
 _PROGRAMMES: dict[str, tuple[tuple[Furnish, ...], dict[Furnish, float]]] = {
     "living room": (

@@ -16,7 +16,7 @@ from scenes.random_draws import chance, choose, integer, uniform
 from scenes.rooms.config import IndoorConfig
 from scenes.rooms.interior import Interior, Placed
 from scenes.rooms.plan import Plan, RoomOpening
-from scenes.shapes.indoor.fixtures import CeilingLamp, Lamp
+from scenes.shapes.indoor.lamps import CeilingLamp, Lamp
 from scenes.shapes.indoor.shell import RoomSlab
 from scenes.shapes.street.buildings import CityBlock
 from scenes.shapes.street.roadside_plants import Shrub

@@ -8,7 +8,7 @@ from scenes.random_draws import chance, choose, integer, uniform
 from scenes.rooms.config import IndoorConfig
 from scenes.rooms.interior import Extent, Interior
 from scenes.rooms.plan import KINDS, WALL_M, Plan, RoomOpening
-from scenes.shapes.indoor.fixtures import Blind, Curtain
+from scenes.shapes.indoor.hangings import Blind, Curtain
 from scenes.shapes.indoor.shell import Hallway, RoomDoor, RoomSlab, RoomWall, RoomWindow, Skirting
 
 
