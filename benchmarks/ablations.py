@@ -31,17 +31,8 @@ from stereoforge.pipelines.prediction import open_predictors, open_settings
 from training.metrics import AUC_STEPS
 from training.networks import DispNetConfig
 from training.networks.regressors.dispnet import MultiscaleObjective
-from training.presets import (
-    SMALL_CONFNET,
-    SMALL_DISPNET,
-    SMALL_GRADNET,
-    STAGE_WEIGHTS,
-    AugmentationConfig,
-    ConfNetPreset,
-    GradNetPreset,
-    Preset,
-    RegressorPreset,
-)
+from training.preset_kinds import ConfNetPreset, GradNetPreset, Preset, RegressorPreset
+from training.presets import SMALL_CONFNET, SMALL_DISPNET, SMALL_GRADNET, STAGE_WEIGHTS, AugmentationConfig
 from training.runs.request import TrainingRequest
 from training.runs.train import train
 from training.runs.weights import copy_weights, has_weights

@@ -31,9 +31,7 @@ from training.losses import multiscale_l1
 from training.networks import ConfNet, DispNetConfig, GradNet, Regressor
 from training.networks.layout import faster_layout
 from training.networks.regressors.registry import regressor_for
-from training.presets import (
-    PRESETS,
-    REGRESSOR_PRESETS,
+from training.preset_kinds import (
     ConfNetPreset,
     FineTuningPreset,
     GradNetPreset,
@@ -41,8 +39,8 @@ from training.presets import (
     RegressorFreeConfNetPreset,
     RegressorFreeGradNetPreset,
     RegressorPreset,
-    find_preset,
 )
+from training.presets import PRESETS, REGRESSOR_PRESETS, find_preset
 from training.tasks import (
     ConfNetTask,
     FineTuningTask,

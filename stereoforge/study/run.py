@@ -39,7 +39,8 @@ from stereoforge.study.plan import NETWORKS, TEST_SPLITS, TRAINING_SPLITS, Study
 from stereoforge.study.results import StudyResult, write_results
 from stereoforge.study.statistics import describe, read_statistics, write_statistics
 from stereoforge_kit.files import alone, write_bytes
-from training.presets import Preset, change_preset, find_preset
+from training.preset_kinds import Preset
+from training.presets import change_preset, find_preset
 from training.runs.model_card import write_model_card
 from training.runs.request import TrainingRequest
 from training.runs.train import train

@@ -15,7 +15,8 @@ from stereoforge.cli import main
 from stereoforge_kit.matching import seem_swapped
 from tests.training.synthetic import random_pair
 from training.networks import ConfNet, GradNet
-from training.presets import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset, find_preset
+from training.preset_kinds import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset
+from training.presets import find_preset
 from training.runs.weights import TrainingSummary, save_weights
 
 

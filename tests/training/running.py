@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from training.presets import Preset
+from training.preset_kinds import Preset
 from training.runs.request import TrainingRequest
 from training.runs.train import train
 from training.runs.weights import TrainingSummary

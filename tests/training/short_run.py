@@ -9,7 +9,8 @@ import torch
 from tests.training.running import train_quietly
 from training.networks import CostVolumeConfig, DispNetConfig
 from training.networks.regressors.interface import RegressorConfig
-from training.presets import RegressorPreset, find_preset
+from training.preset_kinds import RegressorPreset
+from training.presets import find_preset
 
 VALIDATION_INTERVAL = 5  # steps; also between checkpoints
 

@@ -19,17 +19,15 @@ from training.networks import (
 )
 from training.networks.regressors.dispnet import MultiscaleObjective
 from training.networks.regressors.registry import known_regressors, regressor_for
-from training.presets import (
-    PRESETS,
-    REGRESSOR_PRESETS,
+from training.preset_kinds import (
     ConfNetPreset,
     FineTuningPreset,
     GradNetPreset,
     OptimizerConfig,
     Preset,
     RegressorPreset,
-    find_preset,
 )
+from training.presets import PRESETS, REGRESSOR_PRESETS, find_preset
 from training.tasks import ConfNetTask, GradNetTask, RegressorTask
 from training.tasks.base import learning_rate_factor
 

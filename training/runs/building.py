@@ -13,7 +13,7 @@ from training.errors import TrainingError
 from training.networks import ConfNet, GradNet, Regressor
 from training.networks.layout import faster_layout
 from training.networks.regressors.registry import regressor_for
-from training.presets import (
+from training.preset_kinds import (
     ConfNetPreset,
     FineTuningPreset,
     GradNetPreset,

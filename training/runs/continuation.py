@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from training.presets import Preset, RegressorPreset
+from training.preset_kinds import Preset, RegressorPreset
 from training.runs.run_folder import Continuation
 from training.tasks.base import learning_rate_factor
 

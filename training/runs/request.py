@@ -10,16 +10,14 @@ from typing import Any
 from refine.methods.ours import Ours
 from training.data.pipeline import DEFAULT_CACHE_BYTES, Source
 from training.errors import TrainingError
-from training.presets import (
-    DEFAULT_NETWORK,
+from training.preset_kinds import (
     JointPreset,
     Preset,
     RegressorFreeConfNetPreset,
     RegressorFreeGradNetPreset,
     RegressorPreset,
-    change_preset,
-    find_preset,
 )
+from training.presets import DEFAULT_NETWORK, change_preset, find_preset
 from training.runs.hardware import Precision, process_count, trainer_options
 from training.runs.weights import has_weights, load_regressor
 

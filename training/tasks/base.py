@@ -18,7 +18,7 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from stereoforge_kit.viewing import Picture
 from training.data.batch import StereoBatch
 from training.errors import TrainingError
-from training.presets import OptimizerConfig, Preset
+from training.preset_kinds import OptimizerConfig, Preset
 
 STATISTICS_BATCHES = 200
 """Batches over which BatchNorm's statistics are measured before they are fixed. Over 100 batches, two measurements

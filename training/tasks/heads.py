@@ -10,7 +10,7 @@ from torch import Tensor
 from training.data.batch import StereoBatch
 from training.networks import ConfNet, GradNet, Regressor
 from training.networks.inference import estimate, head_inputs
-from training.presets import ConfNetPreset, GradNetPreset, Preset
+from training.preset_kinds import ConfNetPreset, GradNetPreset, Preset
 from training.tasks.base import StereoTask
 from training.tasks.head_objectives import ConfidenceTask, GradientTask
 

@@ -27,7 +27,7 @@ from training.metrics import (
 )
 from training.networks import ConfNet, GradNet, Regressor
 from training.networks.inference import HeadInputs, estimate, head_inputs
-from training.presets import JointPreset
+from training.preset_kinds import JointPreset
 from training.tasks.base import image_of, map_of
 from training.tasks.heads import HeadTask
 

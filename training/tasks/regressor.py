@@ -15,7 +15,7 @@ from training.losses import gradient_aware_l1
 from training.metrics import bad_pixel_rate, end_point_error, forward_gradient, gradient_error
 from training.networks import Regressor
 from training.networks.inference import estimate
-from training.presets import DisparityPreset, FineTuningPreset, RegressorPreset
+from training.preset_kinds import DisparityPreset, FineTuningPreset, RegressorPreset
 from training.tasks.base import StereoTask, image_of, map_of
 
 SMOOTH_WITHIN_PX = 1.0

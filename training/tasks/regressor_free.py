@@ -13,7 +13,7 @@ from training.networks import ConfNet, GradNet, Regressor, left_right_consistenc
 from training.networks.cost_features import CostFeatures
 from training.networks.regressor_free import RegressorFreeInputs, match_batch
 from training.networks.regressors.interface import with_mirrored
-from training.presets import Preset, RegressorFreeConfNetPreset, RegressorFreeGradNetPreset
+from training.preset_kinds import Preset, RegressorFreeConfNetPreset, RegressorFreeGradNetPreset
 from training.tasks.base import StereoTask
 from training.tasks.head_objectives import ConfidenceTask, GradientTask
 

@@ -25,7 +25,8 @@ from stereoforge.study.plan import NETWORKS
 from stereoforge_kit.files import alone
 from tests.refine.worlds import toy_frame
 from tests.stereoforge.pipelines.test_submission import kitti_set
-from training.presets import Preset, find_preset
+from training.preset_kinds import Preset
+from training.presets import find_preset
 
 SIZE = (128, 64)
 STEPS = {"regressor": 2, "regressor_f": 1, "confnet": 1, "gradnet": 1}

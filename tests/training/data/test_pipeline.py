@@ -23,7 +23,7 @@ from training.data.pipeline import (
     shuffle,
 )
 from training.errors import TrainingError
-from training.presets import OptimizerConfig, Preset
+from training.preset_kinds import OptimizerConfig, Preset
 
 PRESET = Preset(
     steps=12, batch_size=2, crop_width=64, crop_height=64, optimizer=OptimizerConfig(), validation_interval=5

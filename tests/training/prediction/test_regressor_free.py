@@ -24,7 +24,8 @@ from training.networks.regressor_free import (
     regressor_free_inputs,
 )
 from training.prediction.predictor import RegressorFreePredictor
-from training.presets import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset, find_preset
+from training.preset_kinds import RegressorFreeConfNetPreset, RegressorFreeGradNetPreset
+from training.presets import find_preset
 from training.runs.weights import TrainingSummary, load_confnet, read_summary, save_weights
 from training.tasks.regressor_free import RegressorFreeConfNetTask
 

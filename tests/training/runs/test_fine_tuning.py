@@ -12,7 +12,8 @@ import torch
 from tests.training.running import train_quietly
 from tests.training.synthetic import write_dataset
 from training.errors import TrainingError
-from training.presets import RegressorPreset, change_preset, find_preset
+from training.preset_kinds import RegressorPreset
+from training.presets import change_preset, find_preset
 
 
 def quick(**changes: object) -> RegressorPreset:

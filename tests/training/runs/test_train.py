@@ -23,7 +23,8 @@ from training.data.pipeline import check_sizes
 from training.errors import TrainingError
 from training.networks import DispNetConfig
 from training.prediction.predictor import StereoPredictor
-from training.presets import Preset, RegressorPreset, find_preset
+from training.preset_kinds import Preset, RegressorPreset
+from training.presets import find_preset
 from training.runs.checkpoints import checkpoint_step
 from training.runs.continuation import describe_continuation
 from training.runs.hardware import Precision

@@ -26,7 +26,8 @@ from training.errors import TrainingError
 from training.networks import ConfNet, DispNetConfig, DispNetCorr1D, GradNet, HeadConfig
 from training.networks.inference import HeadInputs, Regression
 from training.prediction.predictor import StereoPredictor
-from training.presets import JointPreset, Preset, RegressorPreset, find_preset
+from training.preset_kinds import JointPreset, Preset, RegressorPreset
+from training.presets import find_preset
 from training.runs.weights import read_summary
 from training.tasks import JointHeads, JointTask, StereoTask
 
