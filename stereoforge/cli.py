@@ -15,7 +15,6 @@ from typing import Any
 
 from stereoforge.commands import COMMANDS, after_interruption, command_class, command_summary
 from stereoforge.temporary_files import temporary_files_in_out
-from stereoforge_kit.allocation import keep_freed_memory
 from stereoforge_kit.errors import UserError
 from stereoforge_kit.messages import LONGEST_MESSAGE, shortened
 from stereoforge_kit.siblings import check_siblings
@@ -48,7 +47,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     command = None
     try:
         _leave_current_folder()
-        keep_freed_memory()
         check_siblings(__file__, "scenes", "datagen", "training", "refine")
         with _terminated_like_interrupted(), temporary_files_in_out(words):
             command = _parse([word for word in words if word != DEBUG_FLAG])

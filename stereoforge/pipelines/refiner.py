@@ -38,6 +38,9 @@ from stereoforge_kit.errors import InputError
 from training.devices import PredictionPrecision
 from training.prediction.predictor import Prediction
 
+KEPT_UP_TO_PIXELS = 2_100_000
+"""Larger pictures shall not take more memory than they need."""
+
 
 @dataclass(frozen=True)
 class RefinedPair:
@@ -74,7 +77,7 @@ class StereoRefiner:
     """Predicts the disparity of rectified pairs and refines it.
 
     The networks are read once, and the solver's kernels stay compiled, so the second pair takes less time than the
-    first. The process keeps what it frees from then on (`keep_freed_memory`).
+    first. The process keeps what it frees, unless pictures are large (`keep_freed_memory`).
 
     Examples:
         refiner = StereoRefiner()
@@ -110,7 +113,6 @@ class StereoRefiner:
             CommandError: the run folder has no heads for its regressor.
             TrainingError: anything else that is wrong with the run folder or the device.
         """
-        keep_freed_memory()
         run = named_weights(Path(weights))
         settings = open_settings(parameters, run, predictor)
         self._method: Ours = settings.ours
@@ -218,6 +220,7 @@ class StereoRefiner:
                 f"the images differ in size: left {left.shape[1]}x{left.shape[0]}, "
                 f"right {right.shape[1]}x{right.shape[0]}"
             )
+        keep_freed_memory(left.shape[0] * left.shape[1] <= KEPT_UP_TO_PIXELS)
         if disparity is None:
             return self._predictor.predict(left, right)
         if self._matching is None:
