@@ -141,7 +141,8 @@ class Race:
         found: list[float] = []
         for errors, initial in zip(measure_in_stages(method, self.stages), self.initial, strict=True):
             found.append(objective_of(errors, initial, self.objective))
-            if self.best and found[-1] > (1 + CLEARLY_BEHIND) * self.best[len(found) - 1]:
+            measured = len(found) == len(self.stages)
+            if not measured and self.best and found[-1] > (1 + CLEARLY_BEHIND) * self.best[len(found) - 1]:
                 return math.inf
         if not self.best or found[-1] < self.best[-1]:
             self.best = found

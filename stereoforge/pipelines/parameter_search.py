@@ -51,11 +51,6 @@ class _Search:
     seconds: list[float] = field(default_factory=list)
     """What each new trial took; the first one may have waited for a compiler."""
 
-    def __post_init__(self) -> None:
-        """Race against the best known trial."""
-        if self.trials:
-            self.race.against(TunedMethod.best_of(self.kind, self.trials).method)
-
     @property
     def trial_seconds(self) -> float:
         """What a trial takes; 0 where none was made."""
@@ -89,6 +84,8 @@ class _Search:
         self.remember(self.trials)
 
     def _evaluate(self, method: Method) -> float:
+        if self.trials and not self.race.best:  # resumed, and there is something left to try
+            self.race.against(TunedMethod.best_of(self.kind, self.trials).method)
         began = time.perf_counter()
         value = self.race(method)
         self.seconds.append(time.perf_counter() - began)
