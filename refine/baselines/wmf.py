@@ -67,7 +67,7 @@ def weighted_median(
     )
 
 
-@njit("f4(f4[::1], f8[::1], i8, f8)")
+@njit()
 def _weighted_median(values, weights, count, half):  # type: ignore[no-untyped-def]
     """Quickselect: split the candidates [low, high) around a pivot and keep the part that `half` falls into."""
     if count == 0:
@@ -101,7 +101,7 @@ def _weighted_median(values, weights, count, half):  # type: ignore[no-untyped-d
             low = greater
 
 
-@njit("f4[:,::1](f4[:,::1], u1[:,:,::1], i8, f8[::1])", parallel=True)
+@njit(parallel=True)
 def _filter(values, image, radius, weight_of):  # type: ignore[no-untyped-def]
     height, width = values.shape
     result = np.empty_like(values)

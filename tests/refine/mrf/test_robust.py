@@ -13,6 +13,7 @@ from refine import MRFParameters, refine_disparity, solve_mrf
 from refine.energy.confidence_shape import ConfidenceShape
 from refine.methods.ours import Ours
 from refine.methods.ours_quadratic import OursQuadratic
+from refine.mrf import robust
 from refine.mrf.robust import gradient_factor, solve_robust
 from tests.refine.oracles import robust_energy, robust_minimiser
 from tests.refine.worlds import random_problem, toy_frame
@@ -33,6 +34,16 @@ def test_reweighting_ends_at_the_minimum_of_the_energy(height, width, seed, styl
     problem = random_problem(height, width, seed, style)
     found = solve_robust(*problem.inputs, MILD, scale, reweightings=300).disparity
     np.testing.assert_allclose(found, robust_minimiser(problem, MILD, scale), rtol=0, atol=2e-3)
+
+
+@pytest.mark.parametrize("style", ["smooth", "blocks"])
+def test_weighing_ahead_ends_lower_than_one_more_solve_does(style, monkeypatch):
+    problem = random_problem(30, 40, seed=5, style=style)
+    energy = robust_energy(problem, MILD, 0.3)
+    ahead = energy(solve_robust(*problem.inputs, MILD, 0.3).disparity.ravel())[0]
+    monkeypatch.setattr(robust, "AHEAD", 0.0)
+    plain = solve_robust(*problem.inputs, MILD, 0.3, robust.DEFAULT_REWEIGHTINGS + 1)
+    assert ahead < energy(plain.disparity.ravel())[0]
 
 
 @pytest.mark.parametrize("solver", ["cg", "multigrid"])
