@@ -70,8 +70,8 @@ SLANTED_AUGMENTATION = replace(SMALL_AUGMENTATION, shear=0.6)
 """For heads: some crops are sheared, since roads are slanted and flying things are not. A run of 200 steps (`tiny`) is
 too short to learn from it (docs/ablations.md)."""
 
-HEAD_AUGMENTATION = replace(SLANTED_AUGMENTATION, log_zoom=(-0.1, 0.6))
-"""For the heads of a regressor, which may see pictures enlarged."""
+HEAD_AUGMENTATION = replace(SLANTED_AUGMENTATION, log_zoom=(-0.3, 0.4))
+"""For the heads of a regressor: they judge at a picture's own size, whatever size the regressor sees it at."""
 
 SMALL_OPTIMIZER = OptimizerConfig(
     learning_rate=1e-3, schedule="cosine", warmup_steps=500, epsilon=1e-8, weight_decay=1e-4, clip_norm=1.0

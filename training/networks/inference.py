@@ -93,6 +93,34 @@ def head_inputs(
     return _inputs(*regressor.both(left, right), confnet, gradnet, left, right)
 
 
+def crop_inputs(
+    regressor: Regressor, confnet: ConfNet | None, gradnet: GradNet | None, left: Tensor, right: Tensor
+) -> HeadInputs:
+    """What heads are trained on: as `head_inputs`, but the first half of the crops is seen enlarged.
+
+    That is for a regressor that sees pictures enlarged, both of whose answers the heads judge in `estimate`. Of another
+    regressor, and of one crop alone, it is `head_inputs`.
+
+    Args:
+        regressor, confnet, gradnet, left, right: As for `head_inputs`.
+    """
+    size, half = regressor.enlarged_size(*left.shape[-2:]), left.shape[0] // 2
+    if size is None or half == 0:
+        return head_inputs(regressor, confnet, gradnet, left, right)
+    disparity_right = None
+    if confnet is None:
+        own = regressor.regress(left[half:], right[half:])
+    else:
+        both, disparity_right = regressor.both(left, right)
+        own = Regression(both.disparity[half:], {kind: maps[half:] for kind, maps in both.features.items()})
+    enlarged = regress_enlarged(regressor, left[:half], right[:half], size, stretch=1.0)
+    joined = Regression(
+        torch.cat([enlarged.disparity, own.disparity]),
+        {kind: torch.cat([enlarged.features[kind], maps]) for kind, maps in own.features.items()},
+    )
+    return _inputs(joined, disparity_right, confnet, gradnet, left, right)
+
+
 def _inputs(
     regression: Regression,
     disparity_right: Tensor | None,

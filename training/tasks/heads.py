@@ -9,7 +9,7 @@ from torch import Tensor
 
 from training.data.batch import StereoBatch
 from training.networks import ConfNet, GradNet, Regressor
-from training.networks.inference import estimate, head_inputs
+from training.networks.inference import crop_inputs, estimate
 from training.preset_kinds import ConfNetPreset, GradNetPreset, Preset
 from training.tasks.base import StereoTask
 from training.tasks.head_objectives import ConfidenceTask, GradientTask
@@ -44,7 +44,7 @@ class ConfNetTask(HeadTask, ConfidenceTask):
     def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
         """The network's inputs for a batch of crops, and the regressor's disparity."""
         with torch.no_grad():
-            seen = head_inputs(self.regressor, self.network, None, batch.left, batch.right)
+            seen = crop_inputs(self.regressor, self.network, None, batch.left, batch.right)
         return seen.confnet, seen.regression.disparity
 
     def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
@@ -70,7 +70,7 @@ class GradNetTask(HeadTask, GradientTask):
     def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
         """The network's inputs for a batch of crops, and the regressor's disparity."""
         with torch.no_grad():
-            seen = head_inputs(self.regressor, None, self.network, batch.left, batch.right)
+            seen = crop_inputs(self.regressor, None, self.network, batch.left, batch.right)
         return seen.gradnet, seen.regression.disparity
 
     def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:

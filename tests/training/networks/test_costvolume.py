@@ -1,5 +1,7 @@
 """CostVolumeNet as built: its layers, its range, and what it answers for pictures of any size."""
 
+from functools import partial
+
 import pytest
 import torch
 import torch.nn.functional as F  # noqa: N812
@@ -7,10 +9,17 @@ from torch import Tensor, nn
 
 from training.errors import TrainingError
 from training.losses import disparity_smooth_l1, level_cross_entropy
-from training.networks import CostVolumeConfig, CostVolumeNet, DispNetConfig, DispNetCorr1D
+from training.networks import (
+    ConfNet,
+    CostVolumeConfig,
+    CostVolumeNet,
+    DispNetConfig,
+    DispNetCorr1D,
+    GradNet,
+)
 from training.networks.cost_features import CostFeatures
 from training.networks.heads import HeadConfig
-from training.networks.inference import estimate, head_inputs, regress_enlarged
+from training.networks.inference import crop_inputs, estimate, head_inputs, regress_enlarged
 from training.networks.regressors.costvolume import CostVolumeObjective, CostVolumeOutput
 from training.networks.regressors.interface import Regression
 from training.networks.regressors.registry import find_regressor, known_regressors, regressor_for
@@ -283,6 +292,33 @@ def test_heads_are_trained_on_crops_searched_as_far_as_the_regressors() -> None:
         head_inputs(network, None, None, left, right)
         network.regress(left, right, stretch=1.0)
     assert ranges == [160, 160, 96]
+
+
+def test_heads_learn_from_both_answers() -> None:
+    """Half of the crops are judged as they are seen enlarged, at their own size, against the right view as it is."""
+    torch.manual_seed(0)
+    network = CostVolumeNet(NARROW).eval()
+    config = HeadConfig(width=4, hidden=4).on(network)
+    confnet, gradnet = ConfNet(config), GradNet(config)
+    left, right = torch.rand(2, 3, 3, 64, 96)
+    with torch.no_grad():
+        seen = crop_inputs(network, confnet, None, left, right)
+        slopes = crop_inputs(network, None, gradnet, left, right)
+        own = head_inputs(network, confnet, None, left, right)
+        enlarged = regress_enlarged(network, left[:1], right[:1], (128, 192), 1.0)
+    close = partial(torch.testing.assert_close, rtol=1e-4, atol=1e-4)
+    for found in (seen, slopes):
+        close(found.regression.disparity[:1], enlarged.disparity)
+        close(found.regression.disparity[1:], own.regression.disparity[1:])
+        close(found.regression.features["joined"][:1], enlarged.features["joined"])
+        close(found.regression.features["joined"][1:], own.regression.features["joined"][1:])
+    assert (enlarged.disparity - own.regression.disparity[:1]).abs().max() > 1
+    consistency, expected = seen.confnet[2], own.confnet[2]
+    close(consistency[1:], expected[1:])
+    assert consistency.shape == expected.shape
+    network.enlarged_to_pixels = None
+    with torch.no_grad():
+        close(crop_inputs(network, confnet, None, left, right).confnet, own.confnet)
 
 
 def test_the_range_can_be_set_and_changes_no_weights() -> None:
