@@ -90,6 +90,9 @@ class ConfNetPreset(Preset):
 
     network: HeadConfig = field(default_factory=HeadConfig)
     """Options of the network; the number of feature channels is taken from the regressor."""
+    enlarged_share: float = 0.5
+    """Share of the crops of a batch that the regressor sees enlarged, if it is one that sees pictures enlarged (ours).
+    Without a regressor's features it means nothing."""
     correct_within_px: float = 1.0
     """t: a disparity this close to the ground truth is correct. The paper does not give it; KITTI's convention is 3."""
 
@@ -100,6 +103,8 @@ class GradNetPreset(Preset):
 
     network: HeadConfig = field(default_factory=lambda: PUBLISHED_GRADNET)
     """Options of the network; the number of feature channels is taken from the regressor."""
+    enlarged_share: float = 0.5
+    """As in `ConfNetPreset`."""
     gradient_threshold_px: float = 1.0
     """Pixels with larger forward differences are discontinuities and left out. The paper gives one digit, most likely
     1."""

@@ -30,7 +30,7 @@ from stereoforge.pipelines.set_evaluation import (
 )
 from stereoforge.progress import console
 from stereoforge_kit.files import write_text
-from training.devices import parse_device
+from training.devices import computes_in_bfloat16, parse_device
 from training.runs.request import TrainingRequest
 from training.runs.train import train
 
@@ -83,7 +83,7 @@ def run_demo(out: Path, plan: DemoPlan | None = None, device: str = "auto") -> D
         plan: How much of everything.
         device: What the networks run on, as `training.devices.parse_device` takes it.
     """
-    parse_device(device)  # before anything is rendered
+    bfloat16 = computes_in_bfloat16("auto", parse_device(device))  # before anything is rendered
     plan = plan or DemoPlan()
     clock = _Clock(out / "seconds.txt")
     data, weights = out / "data", out / "weights"
@@ -104,6 +104,7 @@ def run_demo(out: Path, plan: DemoPlan | None = None, device: str = "auto") -> D
                     steps=plan.steps[network],
                     resume=True,
                     device=device,
+                    precision="bf16" if bfloat16 else "32",
                 )
             )
     (test,) = open_test_data([str(data)], "test")

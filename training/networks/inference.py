@@ -94,26 +94,32 @@ def head_inputs(
 
 
 def crop_inputs(
-    regressor: Regressor, confnet: ConfNet | None, gradnet: GradNet | None, left: Tensor, right: Tensor
+    regressor: Regressor,
+    confnet: ConfNet | None,
+    gradnet: GradNet | None,
+    left: Tensor,
+    right: Tensor,
+    enlarged_share: float,
 ) -> HeadInputs:
-    """What heads are trained on: as `head_inputs`, but the first half of the crops is seen enlarged.
+    """What heads are trained on: as `head_inputs`, but the first of the crops are seen enlarged.
 
     That is for a regressor that sees pictures enlarged, both of whose answers the heads judge in `estimate`. Of another
-    regressor, and of one crop alone, it is `head_inputs`.
+    regressor it is `head_inputs`.
 
     Args:
         regressor, confnet, gradnet, left, right: As for `head_inputs`.
+        enlarged_share: How many crops are seen enlarged, 0..1, rounded down.
     """
-    size, half = regressor.enlarged_size(*left.shape[-2:]), left.shape[0] // 2
-    if size is None or half == 0:
+    size, first = regressor.enlarged_size(*left.shape[-2:]), int(enlarged_share * left.shape[0])
+    if size is None or first == 0:
         return head_inputs(regressor, confnet, gradnet, left, right)
     disparity_right = None
     if confnet is None:
-        own = regressor.regress(left[half:], right[half:])
+        own = regressor.regress(left[first:], right[first:])
     else:
         both, disparity_right = regressor.both(left, right)
-        own = Regression(both.disparity[half:], {kind: maps[half:] for kind, maps in both.features.items()})
-    enlarged = regress_enlarged(regressor, left[:half], right[:half], size, stretch=1.0)
+        own = Regression(both.disparity[first:], {kind: maps[first:] for kind, maps in both.features.items()})
+    enlarged = regress_enlarged(regressor, left[:first], right[:first], size, stretch=1.0)
     joined = Regression(
         torch.cat([enlarged.disparity, own.disparity]),
         {kind: torch.cat([enlarged.features[kind], maps]) for kind, maps in own.features.items()},

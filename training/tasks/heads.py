@@ -40,11 +40,14 @@ class ConfNetTask(HeadTask, ConfidenceTask):
         super().__init__(preset, regressor, steps, seed)
         self.network = network
         self.correct_within_px = preset.correct_within_px
+        self.enlarged_share = preset.enlarged_share
 
     def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
         """The network's inputs for a batch of crops, and the regressor's disparity."""
         with torch.no_grad():
-            seen = crop_inputs(self.regressor, self.network, None, batch.left, batch.right)
+            seen = crop_inputs(
+                self.regressor, self.network, None, batch.left, batch.right, self.enlarged_share
+            )
         return seen.confnet, seen.regression.disparity
 
     def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:
@@ -66,11 +69,14 @@ class GradNetTask(HeadTask, GradientTask):
         super().__init__(preset, regressor, steps, seed)
         self.network = network
         self.threshold_px = preset.gradient_threshold_px
+        self.enlarged_share = preset.enlarged_share
 
     def head_inputs(self, batch: StereoBatch) -> tuple[tuple[Tensor, ...], Tensor]:
         """The network's inputs for a batch of crops, and the regressor's disparity."""
         with torch.no_grad():
-            seen = crop_inputs(self.regressor, None, self.network, batch.left, batch.right)
+            seen = crop_inputs(
+                self.regressor, None, self.network, batch.left, batch.right, self.enlarged_share
+            )
         return seen.gradnet, seen.regression.disparity
 
     def predict(self, batch: StereoBatch) -> tuple[Tensor, Tensor]:

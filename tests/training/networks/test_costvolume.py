@@ -302,8 +302,8 @@ def test_heads_learn_from_both_answers() -> None:
     confnet, gradnet = ConfNet(config), GradNet(config)
     left, right = torch.rand(2, 3, 3, 64, 96)
     with torch.no_grad():
-        seen = crop_inputs(network, confnet, None, left, right)
-        slopes = crop_inputs(network, None, gradnet, left, right)
+        seen = crop_inputs(network, confnet, None, left, right, 0.5)
+        slopes = crop_inputs(network, None, gradnet, left, right, 0.5)
         own = head_inputs(network, confnet, None, left, right)
         enlarged = regress_enlarged(network, left[:1], right[:1], (128, 192), 1.0)
     close = partial(torch.testing.assert_close, rtol=1e-4, atol=1e-4)
@@ -316,9 +316,10 @@ def test_heads_learn_from_both_answers() -> None:
     consistency, expected = seen.confnet[2], own.confnet[2]
     close(consistency[1:], expected[1:])
     assert consistency.shape == expected.shape
+    assert crop_inputs(network, None, None, left, right, 0.3).regression.disparity.shape == (3, 1, 64, 96)
     network.enlarged_to_pixels = None
     with torch.no_grad():
-        close(crop_inputs(network, confnet, None, left, right).confnet, own.confnet)
+        close(crop_inputs(network, confnet, None, left, right, 0.5).confnet, own.confnet)
 
 
 def test_the_range_can_be_set_and_changes_no_weights() -> None:
