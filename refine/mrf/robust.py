@@ -11,8 +11,8 @@ regularization in computed imaging", 1997):
 the other terms being those of `refine.energy.system`. E stays convex, so it has one minimum, which reweighting finds: a
 quadratic MRF again and again, its gradient terms times psi'(e) / (2 e) = 1 / sqrt(1 + e^2 / scale^2) of the solution
 before. Each lowers E. The solutions creep towards the minimum, step after step the same way, so the terms are weighed
-as far ahead of a solution as it has come from the one before (over-relaxation): four solves then do what five did
-(docs/solver.md).
+as far ahead of a solution as it has come from the one before (over-relaxation). No theorem says that each still lowers
+E then, but four solves do what five did on real pairs (docs/solver.md).
 """
 
 from __future__ import annotations
@@ -74,12 +74,12 @@ def solve_robust(
     tolerances = [max(tolerance, WEIGHING_TOLERANCE)] * reweightings + [tolerance]
     solution = solve_problem(problem, solver, tolerances[0])
     iterations = solution.info.iterations
-    ahead = solution.disparity
+    before = solution.disparity
     for next_tolerance in tolerances[1:]:
-        before, factor = solution.disparity, gradient_factor(ahead, problem.gradient, scale)
-        again = replace(problem, start=before, gradient_factor=factor)
-        solution = solve_problem(again, solver, next_tolerance)
-        ahead = solution.disparity + AHEAD * (solution.disparity - before)
+        here = solution.disparity
+        factor = gradient_factor(here + AHEAD * (here - before), problem.gradient, scale)
+        again = replace(problem, start=here, gradient_factor=factor)
+        before, solution = here, solve_problem(again, solver, next_tolerance)
         iterations += solution.info.iterations
     info = replace(solution.info, iterations=iterations, seconds=time.perf_counter() - began)
     return MRFSolution(solution.disparity, info)
