@@ -85,33 +85,45 @@ class FineTuningPreset(DisparityPreset):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConfNetPreset(Preset):
-    """ConfNet on a frozen regressor."""
+class ConfidencePreset(Preset):
+    """A ConfNet, on disparities from wherever."""
 
     network: HeadConfig = field(default_factory=HeadConfig)
-    """Options of the network; the number of feature channels is taken from the regressor."""
-    enlarged_share: float = 0.5
-    """Share of the crops of a batch that the regressor sees enlarged, if it is one that sees pictures enlarged (ours).
-    Without a regressor's features it means nothing."""
+    """Options of the network; the number of feature channels is taken from what gives the disparity."""
     correct_within_px: float = 1.0
     """t: a disparity this close to the ground truth is correct. The paper does not give it; KITTI's convention is 3."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class GradNetPreset(Preset):
-    """GradNet on a frozen regressor."""
+class ConfNetPreset(ConfidencePreset):
+    """ConfNet on a frozen regressor."""
+
+    enlarged_share: float = 0.5
+    """Share of the crops of a batch that the regressor sees enlarged, if it is one that sees pictures enlarged
+    (ours)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GradientPreset(Preset):
+    """A GradNet, on disparities from wherever."""
 
     network: HeadConfig = field(default_factory=lambda: PUBLISHED_GRADNET)
-    """Options of the network; the number of feature channels is taken from the regressor."""
-    enlarged_share: float = 0.5
-    """As in `ConfNetPreset`."""
+    """As in `ConfidencePreset`."""
     gradient_threshold_px: float = 1.0
     """Pixels with larger forward differences are discontinuities and left out. The paper gives one digit, most likely
     1."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class RegressorFreeConfNetPreset(ConfNetPreset):
+class GradNetPreset(GradientPreset):
+    """GradNet on a frozen regressor."""
+
+    enlarged_share: float = 0.5
+    """As in `ConfNetPreset`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegressorFreeConfNetPreset(ConfidencePreset):
     """ConfNet on disparities from anywhere, without a regressor's features (ours)."""
 
     matcher: SGBMParameters = field(default_factory=SGBMParameters)
@@ -119,7 +131,7 @@ class RegressorFreeConfNetPreset(ConfNetPreset):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RegressorFreeGradNetPreset(GradNetPreset):
+class RegressorFreeGradNetPreset(GradientPreset):
     """GradNet on disparities from anywhere, without a regressor's features (ours)."""
 
     matcher: SGBMParameters = field(default_factory=SGBMParameters)
@@ -140,8 +152,8 @@ class JointPreset(Preset):
     refined_gradient_weight: float = 5.0
     """Weight of the refined disparity's gradient error beside its error in pixels."""
     correct_within_px: float = 1.0
-    """As in `ConfNetPreset`."""
+    """As in `ConfidencePreset`."""
     gradient_threshold_px: float = 1.0
-    """As in `GradNetPreset`; also for the refined disparity's gradient."""
+    """As in `GradientPreset`; also for the refined disparity's gradient."""
     tolerance: float = 1e-4
     """Relative residual at which the linear solves of the forward and the backward pass stop."""
