@@ -17,6 +17,8 @@ INTERSPHINX ?=
 BIN := .venv/bin
 # What Blender's library wants from the system, where it is not there already (Debian's names).
 BLENDER_LIBRARIES := libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libxext6 libsm6 libice6 libgl1
+# And what it draws drafts with (render --engine workbench), in software.
+DRAFT_LIBRARIES := libegl1 libgl1-mesa-dri
 
 # Blender's other line of long-term support comes as a library for Python 3.13 only; no torch beside it.
 PYTHON313 ?= python3.13
@@ -62,13 +64,18 @@ $(BLENDER_5_2)/.installed: pyproject.toml constraints-blender-5.2.txt
 	$(PYTHON) -m venv .venv || { echo "python3 cannot make environments here: apt-get install python3-venv"; exit 1; }
 
 .venv/.installed: .venv/bin/python pyproject.toml $(CONSTRAINTS)
-	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable '.[all]'
+	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable .
+	@# That is enough for the kernels, which are compiled while the large packages come. They are compiled from this
+	@# folder, since pip replaces what it has installed of it.
+	$(BIN)/python -m stereoforge warm-up & compiling=$$!; \
+	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable '.[all]'; \
+	installed=$$?; wait $$compiling && exit $$installed
 	@$(BIN)/python -c 'import bpy' >/dev/null 2>&1 || $(MAKE) --no-print-directory blender-libraries
-	$(BIN)/stereoforge warm-up
 	@touch $@
 
 .venv/.installed-dev: .venv/.installed
 	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --editable '.[all,dev]'
+	@$(BIN)/python -c 'import ctypes; ctypes.CDLL("libEGL.so.1")' 2>/dev/null || $(MAKE) --no-print-directory draft-libraries
 	@# Its other networks need packages that need a GPU; the tests train its GwcNet alone.
 	$(BIN)/python -m pip install --quiet --progress-bar off --constraint $(CONSTRAINTS) $(PIP_FLAGS) --no-deps stereo-toolbox
 	@touch $@
@@ -82,6 +89,12 @@ blender-libraries:
 	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  apt-get update -qq && apt-get install -y -qq $(BLENDER_LIBRARIES) >/dev/null; fi
 	@$(BIN)/python -c 'import bpy' || { echo "Blender needs system libraries: apt-get install $(BLENDER_LIBRARIES)"; exit 1; }
+
+.PHONY: draft-libraries
+draft-libraries:
+	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  apt-get update -qq && apt-get install -y -qq $(DRAFT_LIBRARIES) >/dev/null; \
+	else echo "drafts are not tested here: apt-get install $(DRAFT_LIBRARIES)"; fi
 
 clean:
 	rm -rf .venv $(BLENDER_5_2) build *.egg-info

@@ -52,6 +52,9 @@ def build_material(name: str, material: Material) -> bpy.types.Material:
     output = nodes.new("ShaderNodeOutputMaterial")
     shader = _sheet(block.node_tree, material, surface.outputs[0]) if material.thin else surface.outputs[0]
     links.new(shader, output.inputs["Surface"])
+    # What Workbench shows of it: the active picture, under a roughness and a metallic share of its own.
+    nodes.active = texture
+    block.roughness, block.metallic = material.roughness, material.metallic
     return block
 
 

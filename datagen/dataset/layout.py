@@ -99,6 +99,8 @@ EXTRA_TARGETS = (
     "motion_boundaries",
 )
 """The kinds that a recipe may ask for besides."""
+ENGINES = ("cycles", "workbench")
+"""What may make the pictures: Cycles, which follows light, or Workbench, which draws drafts."""
 RENDER_PASSES = {"clean": "frames_cleanpass", "final": "frames_finalpass"}
 """The kind of picture file by the name of the render pass."""
 

@@ -303,7 +303,7 @@ def _facts(recipe: Recipe, manifest: SceneManifest) -> dict[str, str]:
     return {
         "Family": recipe.family,
         "Seed": str(recipe.seed),
-        "Samples a pixel": str(recipe.samples),
+        "Pictures": recipe.pictures_made_by,
         "Passes": ", ".join(recipe.passes),
         "Recipe": recipe.settings_sha256(),
         "Made with": ", ".join(f"{name} {version}" for name, version in manifest.versions.items()),

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from datagen.dataset.layout import EXTRA_TARGETS, RENDER_PASSES, SPLITS, Layout
+from datagen.dataset.layout import ENGINES, EXTRA_TARGETS, RENDER_PASSES, SPLITS, Layout
 from datagen.errors import DatasetError
 from datagen.formats.limits import MAX_ELEMENTS, read_bounded
 from datagen.recipe.asset_pool import (
@@ -82,6 +82,8 @@ class Recipe:
     such curriculum. Scenes of the other splits are the family's own from the first."""
     curation: Curation = field(default_factory=Curation)
     """Which scenes are rejected and sampled again."""
+    engine: str = field(default="cycles", metadata=OMIT_DEFAULT)
+    """What makes the pictures, among `ENGINES`: Workbench makes drafts, of the clean pass only."""
     disparities: DisparityHistogram | None = field(default=None, metadata=OMIT_DEFAULT)
     """The histogram of disparities that all scenes together shall have; None for whatever the family gives.
 
@@ -97,6 +99,11 @@ class Recipe:
         if not self.passes:
             raise DatasetError(f"passes must be among {', '.join(RENDER_PASSES)}, got none")
         _check_names("passes", self.passes, RENDER_PASSES)
+        _check_names("engine", (self.engine,), ENGINES)
+        if self.engine == "workbench" and "final" in self.passes:
+            raise DatasetError(
+                "workbench makes drafts of the clean pass; the final pass needs the engine cycles"
+            )
         _check_names("targets", self.targets, EXTRA_TARGETS)
         at_least_one = {
             "samples": self.samples,
@@ -153,6 +160,13 @@ class Recipe:
     def family(self) -> str:
         """The name of the family of worlds."""
         return next(name for name, family in FAMILIES.items() if type(self.world) is family.config)
+
+    @property
+    def pictures_made_by(self) -> str:
+        """What makes the pictures, for readers."""
+        if self.engine == "workbench":
+            return "drafts by Blender's Workbench"
+        return f"Cycles, {self.samples} paths a pixel, denoised"
 
     def settings_sha256(self) -> str:
         """The SHA-256 of all settings but the numbers of scenes, which may grow."""

@@ -219,7 +219,7 @@ def _recipe(recipe: Recipe, manifests: dict[str, list[SceneManifest]]) -> str:
         f"- `recipe.yaml`, settings SHA-256 `{recipe.settings_sha256()}`, seed {recipe.seed}.\n"
         "- The same scenes again: `stereoforge render --recipe recipe.yaml --out DIR`.\n"
         f"- Cameras: {camera}.\n"
-        f"- Paths a pixel: {recipe.samples}, denoised.\n"
+        f"- Pictures: {recipe.pictures_made_by}.\n"
         + "".join(f"- Made with {made}.\n" for made in sorted(versions))
     )
 

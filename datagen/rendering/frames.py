@@ -64,6 +64,8 @@ class RenderOptions:
     """Which of `EXTRA_TARGETS` to make."""
     passes: tuple[str, ...] = ("clean",)
     """Which of `RENDER_PASSES` to make."""
+    engine: str = "cycles"
+    """Which of `ENGINES` makes the pictures."""
 
 
 @dataclass
@@ -111,6 +113,7 @@ def render_frames(
     # Imported here so that planning, verifying and training work on a Python without Blender.
     from datagen.blender.build import build_world
     from datagen.blender.camera import render_view
+    from datagen.blender.draft import render_draft, use_workbench
     from datagen.blender.final_pass import render_final
     from datagen.blender.session import CyclesSettings, quiet, start_empty_file
 
@@ -122,16 +125,23 @@ def render_frames(
             caster = caster or SceneRayCaster(build_geometry(scene))
             settings = CyclesSettings(options.samples, options.device, options.threads)
             world = build_world(caster.geometry, start_empty_file(settings))
+            if options.engine == "workbench":
+                use_workbench(world.blender_scene, options.threads)
         sensor = Sensor(scene)
         extra_targets = ExtraTargets(caster, options.targets)
         for frame in range(scene.frames):
+            with watch.step("ground_truth"):
+                hits = {view: caster.cast_all(view, frame) for view in VIEWS}
             with watch.step("render"), quiet(log):
-                radiances = {view: render_view(world, view, frame, scratch) for view in VIEWS}
+                if options.engine == "workbench":
+                    radiances = {
+                        view: render_draft(world, view, frame, hits[view], caster, scratch) for view in VIEWS
+                    }
+                else:
+                    radiances = {view: render_view(world, view, frame, scratch) for view in VIEWS}
             if exposure is None:  # One exposure for a scene: a camera does not flicker.
                 exposure = automatic_exposure(radiances["left"], scene.exposure_key)
             images = {view: {"clean": develop(radiance, exposure)} for view, radiance in radiances.items()}
-            with watch.step("ground_truth"):
-                hits = {view: caster.cast_all(view, frame) for view in VIEWS}
             if "final" in options.passes:
                 with watch.step("render_final"), quiet(log):
                     for view, radiance in render_final(world, frame, exposure, scratch).items():

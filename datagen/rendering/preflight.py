@@ -21,6 +21,11 @@ NO_BLENDER = (
     "rendering needs Blender: pip install 'stereoforge[render]' on Python 3.11 (bpy 4.5) or 3.13 (bpy 5.2)"
 )
 
+NO_OPENGL = (
+    "the engine workbench draws with OpenGL, which does not work here: a driver is missing; in software it is "
+    "apt-get install libegl1 libgl1-mesa-dri"
+)
+
 
 def has_blender() -> bool:
     """Whether this Python has bpy, without loading it, which takes seconds."""
@@ -45,6 +50,21 @@ def check_device(device: str) -> None:
         raise DatasetError(
             f"Blender finds no {device} device on this machine; render on the cpu, or elsewhere"
         )
+
+
+def check_engine(engine: str) -> None:
+    """Raise DatasetError unless the engine makes a picture on this machine: Workbench needs OpenGL.
+
+    It is tried in a process of its own, since drivers crash.
+    """
+    if engine == "cycles":
+        return
+    try:
+        drawn = call_limited(_draws, memory_bytes=None, timeout_s=DEVICE_TIMEOUT_S)
+    except (WorkerError, RuntimeError):
+        drawn = False
+    if not drawn:
+        raise DatasetError(NO_OPENGL)
 
 
 def check_disparity_range(recipe: Recipe) -> None:
@@ -77,3 +97,10 @@ def _finds(device: str) -> bool:
     from datagen.blender.session import finds_device
 
     return finds_device(device)
+
+
+def _draws() -> bool:
+    """Runs in a process of its own, too."""
+    from datagen.blender.draft import draws
+
+    return draws()

@@ -18,7 +18,13 @@ from datagen.executors.devices import assign_devices, find_gpus
 from datagen.recipe.asset_pool import require_assets
 from datagen.recipe.recipe import Recipe, fit_disparities, merge_into, recipe_in, write_recipe
 from datagen.rendering.card import update_card
-from datagen.rendering.preflight import NO_BLENDER, check_device, check_disparity_range, has_blender
+from datagen.rendering.preflight import (
+    NO_BLENDER,
+    check_device,
+    check_disparity_range,
+    check_engine,
+    has_blender,
+)
 from datagen.rendering.quarantine import (
     QuarantinedScene,
     put_in_quarantine,
@@ -291,13 +297,15 @@ def _check_possible(
     """Raise DatasetError for what would make every scene fail, instead of putting all of them in quarantine."""
     here = isinstance(executor, LocalExecutor) or (isinstance(executor, RayExecutor) and executor.runs_here)
     without_blender = here and not has_blender()
-    asks = device != "cpu" or recipe.curation.disparity_px is not None or without_blender
+    asks = device != "cpu" or recipe.curation.disparity_px is not None or recipe.engine != "cycles"
+    asks = asks or without_blender
     if not asks or not set(wanted) - committed_scenes(tree):  # to list a large store takes a while
         return
     if without_blender:
         raise MachineError(NO_BLENDER)
     if here:
         check_device(device)
+        check_engine(recipe.engine)
     check_disparity_range(recipe)
 
 

@@ -106,7 +106,13 @@ def _render_attempt(
     """Render and stage a scene; return its frames' statistics, or None if the first picture is textureless."""
     recipe, staged, scene = job.recipe, Layout(staging), caster.geometry.scene
     options = RenderOptions(
-        recipe.samples, job.device, job.threads, recipe.gradient_threshold_px, recipe.targets, recipe.passes
+        recipe.samples,
+        job.device,
+        job.threads,
+        recipe.gradient_threshold_px,
+        recipe.targets,
+        recipe.passes,
+        recipe.engine,
     )
     statistics: list[dict[str, float]] = []
     with closing(render_frames(scene, staging, options, watch, caster)) as frames:

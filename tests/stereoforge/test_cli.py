@@ -188,6 +188,10 @@ def test_wrong_flags_exit_with_2(tmp_path: Path, refused: Callable[..., str]) ->
     assert "at least 1" in refused(2, "render", "--out", tmp_path / "set", "--samples", "0")
     assert "no --family swimming" in refused(2, "render", "--out", tmp_path / "set", "--family", "swimming")
     assert "I/N" in refused(2, "render", "--out", tmp_path / "set", "--shard", "4/4")
+    drafts = ("render", "--out", tmp_path / "set", "--engine", "workbench")
+    assert "--device is for the engine cycles" in refused(2, *drafts, "--device", "cuda")
+    assert "--samples is for the engine cycles" in refused(2, *drafts, "--samples", "4")
+    assert "final pass needs the engine cycles" in refused(2, *drafts, "--passes", "clean,final")
     for histogram in ("many", "2-20:1,30-60:1", "20-2:1", "2-20:0"):
         asked = ("--disparity-histogram", histogram)
         assert "disparity" in refused(2, "render", "--out", tmp_path / "set", *asked)
