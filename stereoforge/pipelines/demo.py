@@ -42,15 +42,16 @@ SHIPPED_METHODS = ("regressor", "gradnet", "ours", "ours_conf_gt")
 
 @dataclass(frozen=True)
 class DemoPlan:
-    """How much of everything; the defaults fill about a quarter of an hour on two cores, installing included."""
+    """How much of everything; the defaults fill seven to twelve minutes on two cores, installing
+    included."""
 
     world: FlyingThingsConfig = field(
         default_factory=lambda: FlyingThingsConfig(
             width=384, height=192, frames=4, background_objects=(60, 90)
         )
     )
-    scenes: dict[str, int] = field(default_factory=lambda: {"train": 24, "val": 4, "test": 4})
-    steps: dict[str, int] = field(default_factory=lambda: {"regressor": 600, "confnet": 200, "gradnet": 200})
+    scenes: dict[str, int] = field(default_factory=lambda: {"train": 18, "val": 3, "test": 4})
+    steps: dict[str, int] = field(default_factory=lambda: {"regressor": 450, "confnet": 130, "gradnet": 130})
     """Training steps of each network's `tiny` preset."""
     samples: int = 2
     """Paths a pixel."""

@@ -33,13 +33,15 @@ from stereoforge.pipelines.prediction import (
     open_settings,
     train_command,
 )
-from stereoforge_kit.allocation import keep_freed_memory
+from stereoforge_kit.allocation import give_back_freed_memory, keep_freed_memory
 from stereoforge_kit.errors import InputError
 from training.devices import PredictionPrecision
 from training.prediction.predictor import Prediction
 
 KEPT_UP_TO_PIXELS = 2_100_000
 """Larger pictures shall not take more memory than they need."""
+GIVEN_BACK_EVERY = 8
+"""After so many pairs what is kept is given back, so that a long folder takes no more than a short one."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class StereoRefiner:
     """Predicts the disparity of rectified pairs and refines it.
 
     The networks are read once, and the solver's kernels stay compiled, so the second pair takes less time than the
-    first. The process keeps what it frees, unless pictures are large (`keep_freed_memory`).
+    first. The process keeps what it frees for some pairs, unless pictures are large (`keep_freed_memory`).
 
     Examples:
         refiner = StereoRefiner()
@@ -120,6 +122,7 @@ class StereoRefiner:
             self._method = replace(settings.ours_quadratic, form=form)
         self._matching: MatchingPredictor | None = None
         self._predictor: PairPredictor
+        self._pairs = 0
         self.notes: list[str] = []
         """A sentence for each network that heuristics stand in for."""
         if predictor == "sgbm":
@@ -221,6 +224,9 @@ class StereoRefiner:
                 f"right {right.shape[1]}x{right.shape[0]}"
             )
         keep_freed_memory(left.shape[0] * left.shape[1] <= KEPT_UP_TO_PIXELS)
+        self._pairs += 1
+        if self._pairs % GIVEN_BACK_EVERY == 0:
+            give_back_freed_memory()
         if disparity is None:
             return self._predictor.predict(left, right)
         if self._matching is None:

@@ -1,4 +1,4 @@
-"""Freed memory is kept, as the system counts it."""
+"""Freed memory is kept and given back, as the system counts it."""
 
 import subprocess
 import sys
@@ -32,3 +32,31 @@ def test_the_same_pages_are_used_again() -> None:
         for word in ("ask", "keep")
     )
     assert kept < 200 < asked
+
+
+RESIDENT = """
+import re
+from pathlib import Path
+import numpy as np
+from stereoforge_kit.allocation import give_back_freed_memory, keep_freed_memory
+
+def megabytes():
+    return int(re.search(r"VmRSS:\\s*(\\d+)", Path("/proc/self/status").read_text())[1]) // 1024
+
+assert keep_freed_memory()
+before = megabytes()
+arrays = [np.ones(1_000_000) for _ in range(20)]
+del arrays
+kept = megabytes()
+give_back_freed_memory()
+print(kept - before, megabytes() - before)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other C libraries are not told")
+def test_kept_memory_is_given_back() -> None:
+    """Of 160 MB."""
+    words = subprocess.run([sys.executable, "-c", RESIDENT], check=True, capture_output=True).stdout.split()
+    kept, left = map(int, words)
+    assert kept > 140
+    assert left < 20
