@@ -1,4 +1,4 @@
-"""Drafts: pictures by Blender's Workbench, which draws textures and shading with OpenGL, in a third of Cycles' time.
+"""Drafts: pictures by Blender's Workbench, which draws textures and shading with OpenGL.
 
 Lamps, shadows, reflections, glass and the world's light are left out: surfaces have their own colours under a fixed
 set of lights that comes with the camera. The ground truth is that of the same scene.
