@@ -24,14 +24,13 @@ from numpy.typing import NDArray
 from stereoforge.pipelines.refiner import StereoRefiner
 
 COMMAND = """
-import re
-from pathlib import Path
+from benchmarks.refine import memory_peak
 from stereoforge.cli import main
 
 try:
     main()
 finally:
-    print("peak", *re.findall(r"VmHWM:\\s*(\\d+) kB", Path("/proc/self/status").read_text()))
+    print("peak", memory_peak())
 """
 
 Picture = NDArray[np.uint8]
@@ -73,7 +72,7 @@ def run_command(folder: Path, count: int) -> tuple[float, float]:
         [sys.executable, "-c", COMMAND, *arguments], check=True, capture_output=True, text=True
     )
     seconds = time.perf_counter() - began
-    return seconds / count, int(ended.stdout.split()[-1]) / 2**20
+    return seconds / count, int(ended.stdout.split()[-1]) / 2**30
 
 
 def alone(count: int, width: int, height: int) -> tuple[float, float]:

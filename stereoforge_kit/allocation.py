@@ -34,7 +34,7 @@ def give_back_freed_memory() -> None:
     """Give back to the system what is freed and kept, where the C library can.
 
     Blocks that live longer than what lay around them leave holes, and what fits no hole is taken anew, so kept memory
-    grows slowly. The next arrays take new pages: 1.3 GB of them cost some tenths of a second.
+    grows slowly. The next arrays take new pages: 1 GB of them costs about a tenth of a second.
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
     if trim is not None:

@@ -23,6 +23,7 @@ from datagen.ground_truth.raycast import Hits, SceneRayCaster
 from scenes import Scene
 from scenes.spec import World
 from scenes.user_assets.pool import UserEnvironment
+from stereoforge_kit.srgb import to_linear
 
 SAMPLES = "5"
 """Of Workbench's settings for smooth edges."""
@@ -113,8 +114,7 @@ def sky_radiance(world: World, directions: NDArray[np.float64]) -> NDArray[np.fl
     if isinstance(environment, UserEnvironment):
         light = environment.radiance()
     else:
-        encoded = environment.image().astype(np.float32) / 255
-        light = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+        light = to_linear(environment.image() / 255.0).astype(np.float32)
     height, width, _ = light.shape
     x, y, z = directions.T
     column = (0.5 - np.arctan2(y, x) / (2 * np.pi)) * width - 0.5

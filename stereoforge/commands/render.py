@@ -66,7 +66,7 @@ class Render:
     """Paths a pixel for the pictures, denoised; ground truth is exact whatever this is."""
     engine: Annotated[Literal["cycles", "workbench"] | None, shown("cycles|workbench", "cycles")] = None
     """What makes the pictures: cycles follows light; workbench draws drafts with OpenGL, without lamps, shadows and
-    reflections, in a quarter to two thirds of the time. Networks learn more from as many minutes of drafts."""
+    reflections, in a quarter to seven tenths of the time. Networks learn more from as many minutes of drafts."""
     passes: Annotated[str | None, shown("LIST", "clean")] = None
     """Render passes, comma-separated: clean, and final with motion blur, defocus, fog and sensor noise."""
     targets: Annotated[str | None, shown("all|LIST", "none")] = None

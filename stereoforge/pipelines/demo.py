@@ -42,8 +42,7 @@ SHIPPED_METHODS = ("regressor", "gradnet", "ours", "ours_conf_gt")
 
 @dataclass(frozen=True)
 class DemoPlan:
-    """How much of everything; the defaults fill seven to twelve minutes on two cores, installing
-    included."""
+    """How much of everything; the defaults filled 11 minutes on two slow cores, installing included."""
 
     world: FlyingThingsConfig = field(
         default_factory=lambda: FlyingThingsConfig(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereoforge_kit.matching.features import Matches
+from stereoforge_kit.srgb import to_linear
 
 PATCH_SIGMA_PX = 2.0
 """Colours are means over so much, since features lie on edges."""
@@ -40,7 +41,7 @@ def compare_views(
     one, other = one[usable], other[usable]
     pixel_values = _ratio(one.mean(axis=1), other.mean(axis=1))
     red, green, blue = (_ratio(one[:, c], other[:, c]) / pixel_values for c in range(3))
-    light = _ratio(_linear(one).mean(axis=1), _linear(other).mean(axis=1))
+    light = _ratio(to_linear(one).mean(axis=1), to_linear(other).mean(axis=1))
     return ViewDifference(pixel_values, light, (red, green, blue))
 
 
@@ -52,11 +53,6 @@ def _colors(view: NDArray[np.uint8], points: NDArray[np.float64]) -> NDArray[np.
     x, y = (points[:, None, axis].astype(np.float32) for axis in (0, 1))
     values = cv2.remap(smooth, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(values[:, 0], np.float64)
-
-
-def _linear(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Light of sRGB values (IEC 61966-2-1)."""
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
 def _ratio(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:

@@ -24,6 +24,7 @@ from datagen.recipe.preparation.mesh_materials import (
 from datagen.recipe.preparation.side_files import SideFiles, read_gltf
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.messages import shortened
+from stereoforge_kit.srgb import to_srgb
 
 GLTF = (".gltf", ".glb")
 _COMPRESSED = {
@@ -207,15 +208,3 @@ def _bytes(colors: NDArray[Any], linear: bool) -> NDArray[np.uint8]:
     most = float(np.iinfo(colors.dtype).max) if colors.dtype.kind == "u" else 1.0
     level = np.nan_to_num(np.clip(colors[:, :3].astype(np.float64) / most, 0, 1))
     return np.rint(255 * (to_srgb(level) if linear else level)).astype(np.uint8)
-
-
-def to_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Linear levels 0..1 as sRGB's (IEC 61966-2-1)."""
-    return np.where(
-        linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055
-    )
-
-
-def to_linear(srgb: NDArray[np.float64]) -> NDArray[np.float64]:
-    """sRGB's levels 0..1 as linear ones."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

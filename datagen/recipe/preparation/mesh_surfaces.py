@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from datagen.errors import FormatError
 from datagen.formats.picture import decode_picture
 from datagen.recipe.preparation.mesh_materials import FileMaterial, Picture
-from datagen.recipe.preparation.mesh_parts import MeshSurface, to_linear, to_srgb
+from datagen.recipe.preparation.mesh_parts import MeshSurface
 from scenes.spec import GLOSSY
 from stereoforge_kit.messages import shortened
+from stereoforge_kit.srgb import to_linear, to_srgb
 
 MAX_SIDE_PX = 4096
 """Larger pictures are made smaller."""

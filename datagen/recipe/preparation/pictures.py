@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from datagen.formats.picture import read_picture
 from datagen.recipe.preparation.mesh_materials import distinct
-from datagen.recipe.preparation.mesh_parts import to_linear
 from datagen.recipe.preparation.mesh_surfaces import MAX_SIDE_PX
 from datagen.recipe.preparation.meshes import REMARK
 from stereoforge_kit.errors import InputError
 from stereoforge_kit.messages import listed, shortened
+from stereoforge_kit.srgb import to_linear
 
 TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 ENVIRONMENT_SUFFIXES = (".hdr", ".exr", *TEXTURE_SUFFIXES)

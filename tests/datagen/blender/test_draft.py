@@ -28,7 +28,7 @@ from scenes.shapes.solids.basic import Plane
 from scenes.spec import Material, SceneObject, StereoCamera, Trajectory, World
 from scenes.textures.plain import SolidColor
 
-pytestmark = pytest.mark.skipif(find_library("EGL") is None, reason="needs OpenGL's libegl1")
+needs_opengl = pytest.mark.skipif(find_library("EGL") is None, reason="needs OpenGL's libegl1")
 
 DRAFT = RenderOptions(engine="workbench")
 
@@ -38,6 +38,7 @@ def world(family: str, seed: int = 3) -> Scene:
     return sample_scene(np.random.default_rng(seed), family, config)
 
 
+@needs_opengl
 @pytest.mark.parametrize("family", sorted(FAMILIES))
 def test_the_views_match_at_the_true_disparity_and_nowhere_else(family: str, tmp_path: Path) -> None:
     """What both views show of a surface looks alike, since the lights come with the camera."""
@@ -70,6 +71,7 @@ def test_the_sky_is_where_cycles_shows_it(tmp_path: Path) -> None:
     assert np.abs(sky[:, ::-1] - cycles).mean() > 0.05 * cycles.mean()
 
 
+@needs_opengl
 def test_what_is_near_and_what_is_far_are_both_drawn(tmp_path: Path) -> None:
     """A plane two centimetres away beside one at five kilometres: a depth buffer has to hold both."""
     near, far = Material(SolidColor((250, 10, 10))), Material(SolidColor((10, 10, 250)))
@@ -87,6 +89,7 @@ def test_what_is_near_and_what_is_far_are_both_drawn(tmp_path: Path) -> None:
         assert agree.mean() > 0.98  # all but the pixels that the edge goes through
 
 
+@needs_opengl
 def test_a_set_of_drafts_says_so_and_is_the_same_again(tmp_path: Path) -> None:
     recipe = Recipe(
         replace(FAMILIES["indoor"].config(), width=96, height=64), {"train": 1}, engine="workbench"
@@ -118,6 +121,7 @@ def test_what_no_draft_can_be_is_refused() -> None:
         replace(recipe, engine="eevee")
 
 
+@needs_opengl
 def test_a_machine_without_opengl_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     check_engine("workbench")
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere")

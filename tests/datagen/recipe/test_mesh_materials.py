@@ -17,7 +17,6 @@ from PIL import Image
 from trimesh.visual.color import ColorVisuals
 
 from datagen.recipe.preparation.mesh_materials import DULL
-from datagen.recipe.preparation.mesh_parts import to_linear, to_srgb
 from datagen.recipe.preparation.mesh_surfaces import MAX_PIXELS, bake
 from datagen.recipe.preparation.meshes import MAX_TRIANGLES, prepare_mesh
 from datagen.recipe.preparation.side_files import SideFiles, picture_name
@@ -26,6 +25,7 @@ from scenes.spec import GLOSSY, Material
 from scenes.textures.plain import SolidColor
 from scenes.user_assets.pool import UserMesh, UserMeshTexture, use_store
 from stereoforge_kit.errors import InputError
+from stereoforge_kit.srgb import to_linear, to_srgb
 
 RED, GREEN = (200, 20, 10), (10, 180, 30)
 QUARTERS = np.array([[RED, GREEN], [(20, 30, 220), (240, 240, 240)]], np.uint8).repeat(8, 0).repeat(8, 1)
