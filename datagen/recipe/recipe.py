@@ -348,7 +348,9 @@ def merge_into(existing: Recipe, wanted: Recipe, folder: str) -> Recipe:
     for key in sorted(set(before) | set(after), key=lambda key: (key != "world.family", key)):
         if before.get(key) != after.get(key):
             files = pool_difference(existing.assets, wanted.assets) if key.startswith("assets.") else None
-            settings = f"{key} {_brief(before.get(key))}, not {_brief(after.get(key))}"
+            # What is not written is at its default.
+            was, now = (_brief(plain.get(key, "the default")) for plain in (before, after))
+            settings = f"{key} {was}, not {now}"
             raise DatasetError(
                 f"{folder} was rendered with {f'other user assets, there are now {files}' if files else settings}: "
                 "use the same settings to finish or extend it, or another folder"

@@ -100,7 +100,7 @@ def test_a_set_of_drafts_says_so_and_is_the_same_again(tmp_path: Path) -> None:
         pictures.append(StereoDataset(tmp_path / name, "train")[0].left)
     assert (pictures[0] == pictures[1]).all()
     assert "- Pictures: drafts by Blender's Workbench." in (tmp_path / "one" / "README.md").read_text()
-    with pytest.raises(DatasetError, match="engine workbench, not None"):
+    with pytest.raises(DatasetError, match="engine workbench, not the default"):
         render_dataset(replace(recipe, engine="cycles"), tmp_path / "one")
 
 
